@@ -70,7 +70,7 @@ TEST_F(CommandLineTest, AServerThatIsStartingIsWaitedFor) {
   service::ServerOptions options;
   options.listen = "unix:" + Path("socket");
   const pid_t child = Start({"objects", "--server", options.listen, "--wait-s", "300"});
-  while (Read(".err").find("waiting for " + options.listen) == std::string::npos)
+  while (Read(".err").find("waiting for " + options.listen) == std::string::npos && !HasEnded(child))
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   auto server = service::Server::Start(options);
   ASSERT_TRUE(server.ok()) << server.status();

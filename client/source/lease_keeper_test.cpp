@@ -20,16 +20,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-template <typename Done>
-bool Eventually(Done done) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!done()) {
-    if (std::chrono::steady_clock::now() > until) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return true;
-}
-
 class LeaseKeeperTest : public ::testing::Test {
  protected:
   LeaseKeeperTest() {
@@ -163,8 +153,10 @@ class FakeRig : public v1::Control::Service {
       rig_->touch_tokens.push_back(request->lease_token());
       rig_->touch_ids.push_back(request->touch_ids_size() > 0 ? request->touch_ids(0) : "");
       if (rig_->failures-- > 0) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "the arm is not there");
-      rig_->touching = true;
-      while (rig_->hold && !rig_->stopped) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (rig_->hold) {
+        rig_->touching.set_value();
+        rig_->stop_called.get_future().wait();
+      }
       if (rig_->stopped) return grpc::Status(grpc::StatusCode::ABORTED, "stopped");
       response->add_results();
       return grpc::Status::OK;
@@ -210,7 +202,7 @@ class FakeRig : public v1::Control::Service {
   }
   grpc::Status Stop(grpc::ServerContext*, const v1::StopRequest* request, v1::StopResponse*) override {
     stop_reason = request->reason();
-    stopped = true;
+    if (!stopped.exchange(true)) stop_called.set_value();
     return grpc::Status::OK;
   }
 
@@ -224,7 +216,9 @@ class FakeRig : public v1::Control::Service {
 
   static constexpr double window_s = 2;
   std::atomic<int> acquired{0}, renewed{0}, released{0}, failures{0};
-  std::atomic<bool> silent{false}, stale{false}, stopped{false}, hold{false}, touching{false};
+  std::atomic<bool> silent{false}, stale{false}, stopped{false};
+  bool hold = false;  // the one touch of a test lasts until a stop
+  std::promise<void> touching, stop_called;
   std::string stop_reason;
   std::vector<std::string> touch_tokens, touch_ids;
 
@@ -334,7 +328,7 @@ TEST(LeasedSource, StopsTheMotionWhenItIsInterrupted) {
   const auto source = LeasedSource::Open(connection.get());
   ASSERT_TRUE(source.ok());
   std::thread signal([&] {
-    Eventually([&] { return rig.touching.load(); });
+    rig.touching.get_future().wait();
     (*source)->Interrupt("Ctrl-C");
   });
   const auto response = (*source)->Touch(OneTouch("a"));

@@ -94,17 +94,21 @@ TEST(Server, ASlowReaderHoldsBackOnlyItself) {
   const auto slow = stub->StreamDataset(&slow_context, Request(100'000'000, 4096));
   v1::StreamDatasetResponse response;
   ASSERT_TRUE(slow->Read(&response));
-  // And reads no more: until its buffers are full and nothing is made for it.
+  // And reads no more. Others have their streams meanwhile, also once its buffers are full and nothing is made for it.
   const auto control = v1::Control::NewStub(ChannelTo(*server));
-  v1::State state;
-  uint64_t made = 0;
-  do {
-    made = state.touches();
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  const auto touches = [&] {
+    v1::State state;
     grpc::ClientContext context;
-    ASSERT_TRUE(control->GetState(&context, {}, &state).ok());
-  } while (state.touches() == 0 || state.touches() != made);
-  EXPECT_EQ(Descriptors(ChannelTo(*server), Request(200000, 4096)).size(), 200000u * 12u);
+    EXPECT_TRUE(control->GetState(&context, {}, &state).ok());
+    return state.touches();
+  };
+  constexpr uint64_t kSamples = 200'000;
+  uint64_t before = 0, after = touches();
+  do {
+    before = after;
+    ASSERT_EQ(Descriptors(ChannelTo(*server), Request(kSamples, 4096)).size(), kSamples * 12);
+    after = touches();
+  } while (before == 0 || after != before + kSamples);
   slow_context.TryCancel();
   while (slow->Read(&response)) {
   }

@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
     std::filesystem::create_directories(folder);
     touchstone::rig::EmulatorOptions options;
     options.dir = folder.string();
-    options.speedup = 10;  // pictures are taken: the rig's clock does not wait for the camera
+    options.speedup = 40;
     options.supershape_triangles = 2000;
     if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller
     emulator = touchstone::rig::Emulator::Start(options);

@@ -4,9 +4,8 @@ import json
 
 import pytest
 
-from test_rig_commands import emulated_rig, touchstone
+from test_rig_commands import SPEEDUP, emulated_rig, touchstone
 
-SPEEDUP = 10
 # The emulated rig exists once.
 pytestmark = pytest.mark.xdist_group("photograph_plan")
 COLUMNS = ["image", "file", "object", "eye_x_mm", "eye_y_mm", "eye_z_mm", "at_x_mm", "at_y_mm", "at_z_mm", "up_x", "up_y",

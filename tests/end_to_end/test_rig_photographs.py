@@ -5,9 +5,8 @@ import json
 
 import pytest
 
-from test_rig_commands import ROOT, emulated_rig, touchstone
+from test_rig_commands import ROOT, SPEEDUP, emulated_rig, touchstone
 
-SPEEDUP = 20
 # The emulated rig exists once.
 pytestmark = pytest.mark.xdist_group("rig_photographs")
 HIDDEN_K1 = -0.2

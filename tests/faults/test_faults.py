@@ -41,9 +41,13 @@ def test_a_full_disk_loses_nothing_that_was_acknowledged():
         pytest.skip(str(error))
 
 
+HOSTILE_PARTS = 4
+
+
+@pytest.mark.parametrize("part", range(HOSTILE_PARTS))
 @pytest.mark.parametrize("source", hostile_bytes.SOURCES, ids=["server", "gateway"])
-def test_every_method_answers_hostile_bytes(source):
-    passes(hostile_bytes.run(calls=8, sources=(source,)))
+def test_every_method_answers_hostile_bytes(source, part):
+    passes(hostile_bytes.run(calls=8, sources=(source,), part=(part, HOSTILE_PARTS)))
 
 
 def test_many_clients_get_the_same_bytes():

@@ -22,7 +22,6 @@ class GatewayPhotographs : public PhysicalTest {
   void StartEmulator() {
     StartRig([](rig::EmulatorOptions* options) {
       options->camera_width = kWidth, options->camera_height = kHeight;
-      options->speedup = kSpeedupWithCamera;
     });
   }
   struct Picture {

@@ -23,8 +23,8 @@ namespace touchstone {
 
 namespace {
 
-// Limits that a busy machine, or one under sanitizers, keeps too; those of the lease are host time, the others the
-// rig's clock over its speed-up. A rig has shorter ones.
+// Limits that a busy machine, or one under sanitizers, keeps too; that of the lease is host time (of a gateway in another
+// process), the others the rig's clock over its speed-up. A rig has shorter ones.
 const std::vector<std::string>& Patience() {
   static const std::vector<std::string> flags = {"--lease-window-s", "2",   "--arm-watchdog-hz",    "1",
                                                  "--arm-silence-s",  "1.5", "--effector-silence-s", "3"};
@@ -92,6 +92,8 @@ void PhysicalTest::StartGateway(std::vector<std::string> flags) {
   for (const std::string& flag : flags) argv.push_back(flag.c_str());
   auto parsed = service::ParseGatewayFlags(static_cast<int>(argv.size()), argv.data());
   ASSERT_TRUE(parsed.ok()) << parsed.status();
+  parsed->options.common.clock = &lease_clock_;
+  parsed->options.common.max_unary_calls_per_s = 0;  // calls are counted by it, too
   auto gateway = service::GatewayServer::Start(parsed->options);
   ASSERT_TRUE(gateway.ok()) << gateway.status();
   gateway_ = *std::move(gateway);

@@ -13,6 +13,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
 #include "server/service/gateway_server.h"
 #include "server/session/journal.h"
@@ -22,10 +23,6 @@
 #include "touchstone/v1/source.grpc.pb.h"
 
 namespace touchstone {
-
-// For tests that take pictures. The rig's clock does not wait for the emulated camera, whose pictures take time of the host:
-// at this pace a picture that comes late was still taken where the arm is.
-constexpr double kSpeedupWithCamera = 5;
 
 // A lease that is renewed until it is dropped.
 class KeptLease {
@@ -52,7 +49,8 @@ class PhysicalTest : public testing::Test {
   // With changes to the emulator's options before it begins. Touches from above of lat00 need no change
   // of the object.
   void StartRig(const std::function<void(rig::EmulatorOptions*)>& change = nullptr);
-  // In this process, or (over the program touchstone-gateway) in another one that can be killed.
+  // In this process, where leases run out as the test moves lease_clock_, or (over the program touchstone-gateway) in
+  // another one that can be killed.
   void StartGateway(std::vector<std::string> flags = {});
   void StopGateway();
   void StartGatewayProcess();
@@ -89,6 +87,7 @@ class PhysicalTest : public testing::Test {
   // are of the same one: nothing lost, doubled or at a wrong pose.
   void ExpectEveryResultIsItsOwnTouch();
 
+  ManualClock lease_clock_;
   const TestFolder folder_;
   std::unique_ptr<rig::Emulator> emulator_;
   std::unique_ptr<service::GatewayServer> gateway_;

@@ -1,11 +1,17 @@
 // A gateway that serves a journal again: its lists in pages, and clients that do not read what they asked for.
+#include <absl/cleanup/cleanup.h>
+#include <absl/strings/match.h>
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
 
-#include <chrono>
-#include <thread>
+#include <atomic>
+#include <memory>
+#include <mutex>
 
+#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
 #include "server/service/gateway_server.h"
 #include "server/session/command_bytes.h"
@@ -37,6 +43,19 @@ session::JournalTouch TouchOf(int number) {
   return touch;
 }
 
+// Whether a call was cancelled since its client read nothing.
+class StallSink : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  std::atomic<bool> seen{false};
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (absl::StrContains(absl::string_view(message.payload.data(), message.payload.size()), "stall_s"))
+      seen = true;
+  }
+  void flush_() override {}
+};
+
 class RecordedSessions : public testing::Test {
  protected:
   void AddSession(const std::string& name, int touches) {
@@ -57,12 +76,13 @@ class RecordedSessions : public testing::Test {
     ASSERT_TRUE((*journal)->DeleteSession(name, "ana@lab").ok());
   }
 
-  void Start(double stall_s = 300) {
+  void Start() {
     service::GatewayOptions options;
     options.replay = path_;
     options.common.listen = "127.0.0.1:0";
     options.common.supershape_triangles = 2000;
-    options.common.stall_s = stall_s;
+    options.common.clock = &clock_;
+    options.common.stall_s = kStallS;
     auto gateway = service::GatewayServer::Start(options);
     ASSERT_TRUE(gateway.ok()) << gateway.status();
     gateway_ = *std::move(gateway);
@@ -94,6 +114,9 @@ class RecordedSessions : public testing::Test {
     return names;
   }
 
+  static constexpr double kStallS = 300;
+
+  ManualClock clock_;
   const TestFolder folder_;
   const std::string path_ = folder_.Path("rig.db");
   std::unique_ptr<service::GatewayServer> gateway_;
@@ -137,15 +160,26 @@ TEST_F(RecordedSessions, ATokenThatNoPageGaveIsRefused) {
 }
 
 TEST_F(RecordedSessions, AnExportThatNobodyReadsIsCancelled) {
-  AddSession("large", 60'000);
-  Start(0.2);
+  AddSession("large", 30'000);
+  const auto stalled = std::make_shared<StallSink>();
+  spdlog::default_logger()->sinks().push_back(stalled);
+  const absl::Cleanup restore = [this] {
+    gateway_ = nullptr;  // its threads use the logger
+    spdlog::default_logger()->sinks().pop_back();
+  };
+  Start();
   grpc::ClientContext context;
   v1::ExportSessionRequest request;
   request.set_name("large");
   const auto reader = v1::Sessions::NewStub(channel_)->ExportSession(&context, request);
   v1::ExportSessionResponse response;
-  // A reader that takes a piece each 0.4 s lets the gateway wait for longer than it may.
-  while (reader->Read(&response)) std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  ASSERT_TRUE(reader->Read(&response));
+  // It reads no more, and time passes until the gateway has had enough.
+  const auto read = clock_.Now();
+  while (!stalled->seen) clock_.Advance(1);
+  EXPECT_GT(clock_.SecondsSince(read), kStallS);
+  while (reader->Read(&response)) {
+  }
   EXPECT_EQ(reader->Finish().error_code(), grpc::CANCELLED);
 }
 

@@ -48,8 +48,10 @@ TEST_F(Safety, ADeadClientsMotionStops) {
   StartGateway();
   KeptLease lease(control_.get(), "dies", true);
   lease.StopRenewing();
-  // Its approach takes longer than its lease lasts.
-  const Answer answer = Touch(lease.token(), FromAbove(0.0002), "of a dead client");
+  auto touch = TouchLater(lease.token(), FromAbove(kSlow), "of a dead client");
+  WaitUntilApproaching();
+  lease_clock_.Advance(1.01 * lease.window_s());
+  const Answer answer = touch.get();
   EXPECT_EQ(answer.status.error_code(), grpc::ABORTED) << answer.status.error_message();
   WaitForRest();
   EXPECT_LT(emulator_->touches(), 1u) << "it went on until contact";

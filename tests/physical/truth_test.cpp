@@ -80,7 +80,7 @@ TEST_F(Truth, ATouchWithTheSpeedSliderAtHalfIsRefusedWithBothNumbers) {
 }
 
 TEST_F(Truth, APictureAfterAFreshJournalIsTakenFromItsOwnPose) {
-  StartRig([](rig::EmulatorOptions* options) { options->speedup = kSpeedupWithCamera; });
+  StartRig();
   StartGateway();
   uint32_t last = 0;
   {
@@ -114,7 +114,7 @@ TEST_F(Truth, APictureAfterAFreshJournalIsTakenFromItsOwnPose) {
 }
 
 TEST_F(Truth, TheSameViewCanBePhotographedAgain) {
-  StartRig([](rig::EmulatorOptions* options) { options->speedup = kSpeedupWithCamera; });
+  StartRig();
   StartGateway();
   KeptLease lease(control_.get(), "client", true);
   for (int k = 0; k < 3; ++k) {
@@ -143,7 +143,7 @@ TEST_F(Truth, FreshJournalsBeginAtProgramIdsOfTheirOwn) {
 }
 
 TEST_F(Truth, APictureFromFartherOffThanTheToleranceIsRefused) {
-  StartRig([](rig::EmulatorOptions* options) { options->speedup = kSpeedupWithCamera; });
+  StartRig();
   StartGateway({"--camera-pose-tolerance-mm", "0.001"});
   KeptLease lease(control_.get(), "client", true);
   v1::CaptureResponse response;

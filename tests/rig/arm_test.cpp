@@ -20,14 +20,17 @@ using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;  // host time; the machine may be busy
 
-// A heartbeat as the gateway gives it while something moves.
+// A heartbeat as the gateway gives it while something moves; the rig's time waits for it.
 class Heart {
  public:
-  explicit Heart(gateway::arm::Arm* arm)
-      : thread_([this, arm] {
+  Heart(gateway::arm::Arm* arm, rig::SimClock* clock)
+      : thread_([this, arm, clock] {
+          rig::SimClock::Part part(clock, nullptr);
           while (beating_) {
+            const double now_s = clock->NowS();
             arm->SendHeartbeat();
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            part.Done(now_s);
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
           }
         }) {}
   ~Heart() { Stop(); }
@@ -143,7 +146,7 @@ TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
 }
 
 TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(7);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
   ASSERT_TRUE(WaitForPhase(7, gateway::arm::MotionPhase::kReady));
@@ -165,7 +168,7 @@ TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
 }
 
 TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(8, 0.002);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
   ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kReady));
@@ -183,7 +186,7 @@ TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
 }
 
 TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(9);
   gateway::arm::Joints joints = options_.joints_rad;
   joints[0] += 0.2;
@@ -193,7 +196,7 @@ TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
 }
 
 TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(10, 0.002);
   ASSERT_TRUE(arm_->StartTouch(touch).ok());
   ASSERT_TRUE(WaitForPhase(10, gateway::arm::MotionPhase::kReady));
@@ -207,7 +210,7 @@ TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
 }
 
 TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   for (uint32_t id = 20; id < 30; ++id) {
     const gateway::arm::ArmTouch touch = SomeTouch(id);
     ASSERT_TRUE(Wait([&] { return arm_->Ready().ok(); })) << arm_->Ready();
@@ -225,8 +228,23 @@ TEST_F(EmulatedArm, ProgramSentJustBeforeAStopDoesNotBeginAfterIt) {
   }
 }
 
+TEST_F(EmulatedArm, ProgramThatIsStoppedAfterItsGuardHasAnsweredDoesNotRun) {
+  Heart heart(arm_.get(), &clock_);
+  const gateway::arm::ArmTouch touch = SomeTouch(31);
+  // The thread that sends it was held up between the two, for longer than a stop waits.
+  const auto guard = [&] {
+    std::thread([&] { EXPECT_TRUE(arm_->Stop().ok()); }).join();
+    return absl::OkStatus();
+  };
+  EXPECT_EQ(arm_->StartTouch(touch, guard).code(), absl::StatusCode::kAborted);
+  ExpectAtRestSoon();
+  // Nor does the arm wait for it to begin.
+  PassRigTime(1.2 * arm_options_.program_start_s * clock_.speedup());
+  EXPECT_TRUE(arm_->State().ok()) << arm_->State().status();
+}
+
 TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(12)).ok());
   ASSERT_TRUE(WaitForProgram(12));
   faults_.Set("disconnect", 1);
@@ -237,7 +255,7 @@ TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
 
 // Not the tool centre point, which a UR takes where a program does not name it.
 TEST_F(EmulatedArm, ControllerGetsTheCentreOfGravityOfThePayload) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(19)).ok());
   ASSERT_TRUE(WaitForProgram(19));
   rig::TouchClient state(controller_->ports().rtde, "payload,payload_cog");
@@ -250,7 +268,7 @@ TEST_F(EmulatedArm, ControllerGetsTheCentreOfGravityOfThePayload) {
 }
 
 TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(13, 0.001)).ok());
   ASSERT_TRUE(WaitForPhase(13, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(13).ok());
@@ -261,7 +279,7 @@ TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {
 }
 
 TEST_F(EmulatedArm, ProtectiveStopForbidsMotionInWordsAndIsNeverUnlocked) {
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(14)).ok());
   faults_.Set("protective_stop", 1);
   ASSERT_TRUE(Wait([&] {
@@ -293,7 +311,7 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
     const auto state = arm_->State();
     return state.ok() && state->controller_time_s > before_s;
   }));
-  Heart heart(arm_.get());
+  Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(arm_->StartTouch(SomeTouch(16)).ok());
   EXPECT_TRUE(WaitForPhase(16, gateway::arm::MotionPhase::kReady));
 }

@@ -190,7 +190,7 @@ TheEmulator::TheEmulator(const EmulatorOptions& options) : options_(options) {
   camera.address = options.address, camera.port = options.camera_port, camera.seed = options.seed;
   camera.vertical_fov_rad = kVerticalFovDeg * M_PI / 180;
   camera_ = std::make_unique<EmulatedCamera>(
-      camera, [this] { return Look(); }, &faults_);
+      camera, [this] { return Look(); }, clock_.get(), &faults_);
   control_ =
       std::make_unique<TcpServer>(options.address, options.control_port, [this](LineConnection& connection) {
         for (std::string line; connection.ReadLine(&line);)

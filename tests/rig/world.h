@@ -53,8 +53,11 @@ class SimClock {
     ~Part();
     Part(const Part&) = delete;
     Part& operator=(const Part&) = delete;
-    // It has done everything that was due by then.
+    // It has done everything that was due by then. Not later than kAheadHostS (times the speed-up) before a moment that
+    // time must not pass until this part says so: time stands exactly there.
     void Done(double sim_s);
+    // It is that time, and every other part has done everything that was due by then.
+    bool OthersDone(double sim_s) const;
 
    private:
     friend class SimClock;

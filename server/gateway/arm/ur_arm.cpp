@@ -71,10 +71,10 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
                                                       " already, so the end of a new one of that id could "
                                                       "not be told from the old one's: take another id"));
   bool permitted = false;
-  uint64_t stops = 0;
+  // Before the guard is asked: a stop after its answer that does not wait until the program has gone out is seen below.
+  const uint64_t stops = stop_count_;
   const absl::Status sent = SendStart(guard, [&] {
     permitted = true;
-    stops = stop_count_;
     withhold_heartbeats_ = false;
     {
       std::lock_guard<std::mutex> lock(mutex_);
@@ -85,15 +85,14 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
     return programs_.Send(program, [&] { return stop_count_ != stops ? StopProgram() : std::string(); });
   });
   if (!permitted) return sent;
-  if (stop_count_ != stops) {
-    SendStop().IgnoreError();
-    return absl::AbortedError(absl::StrCat("program ", program_id, " was stopped before it began"));
-  }
-  if (!sent.ok()) {
+  const bool stopped = stop_count_ != stops;
+  if (stopped || !sent.ok()) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (start_.program_id == program_id) start_ = Start();
   }
-  return sent;
+  if (!stopped) return sent;
+  SendStop().IgnoreError();
+  return absl::AbortedError(absl::StrCat("program ", program_id, " was stopped before it began"));
 }
 
 UrKinematics UrArmOnTcp::Kinematics() const {

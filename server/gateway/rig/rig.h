@@ -167,8 +167,8 @@ class Rig : public source::RigDevice {
   // Another one than the controller's registers show. Refused where it could be used again after a restart: the journal
   // must know of it.
   absl::StatusOr<uint32_t> NextProgramId();
-  // The states that have arrived since, and the next one.
-  std::vector<arm::ArmState> StatesSince(double host_s) const;
+  // The states of after that time of the controller that have arrived, and the next one.
+  std::vector<arm::ArmState> StatesAfter(double controller_s) const;
   absl::Status EnsureSession(const std::string& name);
 
   // touch_cycle.cpp

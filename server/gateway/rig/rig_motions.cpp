@@ -2,7 +2,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
-#include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "server/base/status.h"
 #include "server/gateway/arm/ur_modes.h"
@@ -85,16 +86,17 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   const double began_s = NowS();
   TOUCHSTONE_ASSIGN_OR_RETURN(const double session_time_s, session_clock_.NowS(command.session));
   TOUCHSTONE_RETURN_IF_ERROR(MoveThrough(plan.motion.transit, {}, plan.motion.duration_s, guard));
-  const double asked_s = NowS();
-  const absl::StatusOr<image::Frame> frame = parts_.camera->Take(asked_s);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState arrived, parts_.arm->State());
+  const absl::StatusOr<image::Frame> frame = parts_.camera->Take(NowS());
   if (!frame.ok()) {
     Remember(frame.status());
     return frame.status();
   }
-  // Every state from the asking to now: the exposure lies somewhere within.
+  // Every state from the asking to now: the exposure lies somewhere within. By the controller's time, since states that
+  // are read together have one host time, which the asking may have too: the clock of an emulated rig stands now and then.
   const Eigen::Isometry3d tip_from_camera = plan.motion.transit.back().inverse() * base_from_camera;
-  const absl::StatusOr<MeasuredCameraPose> measured =
-      MeasureCameraPose(StatesSince(asked_s), tip_from_camera, base_from_camera, options_.camera_tolerance);
+  const absl::StatusOr<MeasuredCameraPose> measured = MeasureCameraPose(
+      StatesAfter(arrived.controller_time_s), tip_from_camera, base_from_camera, options_.camera_tolerance);
   if (!measured.ok()) {
     Remember(measured.status());
     return measured.status();
@@ -128,24 +130,20 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
   return photograph;
 }
 
-std::vector<arm::ArmState> Rig::StatesSince(double host_s) const {
+std::vector<arm::ArmState> Rig::StatesAfter(double controller_s) const {
   constexpr double kNextStateS = 0.5;  // host time
   const double called_s = NowS();
   uint64_t changes = parts_.changes->count();
   absl::StatusOr<arm::ArmState> now = parts_.arm->State();
-  while (now.ok() && now->host_time_s < called_s && NowS() < called_s + kNextStateS) {
+  const auto is_next = [&] { return now->host_time_s >= called_s && now->controller_time_s > controller_s; };
+  while (now.ok() && !is_next() && NowS() < called_s + kNextStateS) {
     parts_.changes->WaitForChange(changes, 0.01);
     changes = parts_.changes->count();
     now = parts_.arm->State();
   }
   if (!now.ok()) return {};
-  const double since_rig_s = (NowS() - host_s + 1) * options_.time_scale;
-  std::vector<arm::ArmState> states =
-      parts_.arm->History(now->controller_time_s - since_rig_s, now->controller_time_s);
-  const auto first = std::find_if(states.begin(), states.end(),
-                                  [&](const arm::ArmState& state) { return state.host_time_s >= host_s; });
-  states.erase(states.begin(), first);
-  return states;
+  return parts_.arm->History(std::nextafter(controller_s, std::numeric_limits<double>::infinity()),
+                             now->controller_time_s);
 }
 
 absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,

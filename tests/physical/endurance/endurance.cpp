@@ -149,6 +149,7 @@ PhysicalTest::Answer Endurance::Broken(const v1::CommandedTouch& command, const 
     return answer;
   });
   SleepS(Uniform(0, 1.2 * usual_s_));
+  if (fault == "lease_lost") lease_clock_.Advance(2 * lease_->window_s());
   if (fault == "unplug") faults.Set(fault, Uniform(0.005, 0.1));
   if (fault == "reset") emulator_->Tell("reset");
   if (fault == "freeze") faults.Set(fault, Uniform(0.05, 0.8));

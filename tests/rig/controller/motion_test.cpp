@@ -301,6 +301,24 @@ TEST(SimClock, WaitsForThePartThatIsBehind) {
   EXPECT_FALSE(clock.Stands()) << "who has left is not waited for";
 }
 
+TEST(SimClock, StandsAtTheMomentThatAPartHasNotPassed) {
+  SimClock clock(1e9);
+  SimClock::Part first(&clock, nullptr), second(&clock, nullptr);
+  const double ahead_s = SimClock::kAheadHostS * clock.speedup(), moment_s = clock.NowS() + 3 * ahead_s;
+  first.Done(moment_s - ahead_s);
+  while (!clock.Stands()) continue;
+  EXPECT_LT(clock.NowS(), moment_s) << "the second one is behind";
+  second.Done(moment_s - ahead_s);
+  while (clock.NowS() < moment_s * (1 - 1e-9)) continue;
+  EXPECT_FALSE(first.OthersDone(moment_s));
+  second.Done(moment_s);
+  EXPECT_TRUE(first.OthersDone(moment_s));
+  second.Done(1e18);
+  EXPECT_NEAR(clock.NowS(), moment_s, 1e-9 * moment_s);
+  first.Done(moment_s);
+  while (clock.NowS() < moment_s + 0.5 * ahead_s) continue;
+}
+
 TEST(SimClock, DoesNotMakeUpForTheTimeThatItStood) {
   SimClock clock(1);
   SimClock::Part part(&clock, nullptr);

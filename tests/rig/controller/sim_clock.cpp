@@ -11,6 +11,7 @@ namespace {
 
 using gateway::timing::PacedClock;
 
+constexpr double kRoundingS = 1e-9;  // of the moment at which time stands
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 // Host time that the parts of a manual clock may take for one step, on a busy machine.
 constexpr std::chrono::seconds kStepPatience{60};
@@ -101,6 +102,14 @@ void SimClock::Part::Done(double sim_s) {
     clock_->done_.notify_all();
   else
     clock_->Move();
+}
+
+bool SimClock::Part::OthersDone(double sim_s) const {
+  const std::lock_guard<std::mutex> lock(clock_->mutex_);
+  const double due_s = sim_s - kRoundingS;
+  return clock_->NowS() >= due_s &&
+         std::all_of(clock_->parts_.begin(), clock_->parts_.end(),
+                     [&](const Part* part) { return part == this || part->done_s_ >= due_s; });
 }
 
 }  // namespace touchstone::rig

@@ -3,7 +3,10 @@
 #include <linux/inet_diag.h>
 #include <linux/netlink.h>
 #include <linux/sock_diag.h>
+#include <linux/sockios.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -69,6 +72,18 @@ size_t UnreadByPeer(int fd) {
       getpeername(fd, reinterpret_cast<sockaddr*>(&peer), &peer_size) != 0 || peer.sin_family != AF_INET)
     return 0;
   return table.Unread(peer, own);
+}
+
+size_t UnreadOrUnderway(int fd) {
+  // In this order: what arrives in between is counted twice rather than not at all.
+  int underway = 0;
+  if (ioctl(fd, SIOCOUTQ, &underway) != 0) underway = 0;
+  // The kernel counts what was sent to a peer that has closed for ever.
+  tcp_info connection{};
+  socklen_t size = sizeof connection;
+  if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &connection, &size) != 0 || connection.tcpi_state == TCP_CLOSE)
+    return 0;
+  return static_cast<size_t>(underway) + UnreadByPeer(fd);
 }
 
 bool ReaderPatience::WaitsFor(size_t unread_bytes) {

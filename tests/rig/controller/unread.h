@@ -9,6 +9,10 @@ namespace touchstone::rig {
 // peer is on another host, or the kernel has no sock_diag.
 size_t UnreadByPeer(int fd);
 
+// What was sent and the peer has not read, wherever it lies. With a peer on another host: what has not arrived there.
+// 0 once the connection is closed.
+size_t UnreadOrUnderway(int fd);
+
 // How long one reader is waited for: one that has stopped or died does not stop the others' time.
 class ReaderPatience {
  public:

@@ -7,19 +7,48 @@
 #include <vector>
 
 #include "server/image/encode.h"
+#include "tests/rig/controller/unread.h"
 
 namespace touchstone::rig {
 namespace {
 
 constexpr int kGroundLevel = 14, kNoiseLevels = 5;
 constexpr double kLookAheadM = 0.2;
+constexpr double kAskAgainS = 2e-4;  // whether others are done and viewers have read, host time
 constexpr char kBoundary[] = "touchstone-emulated-frame";
 
 }  // namespace
 
+// Registered as long as it lives.
+class EmulatedCamera::Viewer {
+ public:
+  Viewer(EmulatedCamera* camera, int the_fd) : fd(the_fd), camera_(camera) {
+    std::lock_guard<std::mutex> lock(camera_->mutex_);
+    sent = camera_->number_;
+    camera_->viewers_.push_back(this);
+    camera_->changed_.notify_all();
+  }
+  ~Viewer() {
+    std::lock_guard<std::mutex> lock(camera_->mutex_);
+    auto& viewers = camera_->viewers_;
+    viewers.erase(std::find(viewers.begin(), viewers.end(), this));
+    camera_->changed_.notify_all();
+  }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+
+  const int fd;
+  // The rest with the camera's mutex_.
+  uint64_t sent;  // number of the picture that it was sent last, or of the one before it came
+  ReaderPatience patience;
+
+ private:
+  EmulatedCamera* const camera_;
+};
+
 EmulatedCamera::EmulatedCamera(const CameraOptions& options, std::function<CameraView()> look,
-                               const Faults* faults)
-    : options_(options), look_(std::move(look)), faults_(faults), random_(options.seed) {
+                               SimClock* clock, const Faults* faults)
+    : options_(options), look_(std::move(look)), clock_(clock), faults_(faults), random_(options.seed) {
   auto renderer = image::CreateCpuRenderer();
   if (!renderer.ok()) throw std::runtime_error(std::string(renderer.status().message()));
   renderer_ = *renderer;
@@ -93,33 +122,67 @@ std::string EmulatedCamera::Picture() {
 }
 
 void EmulatedCamera::Run() {
-  const auto period = std::chrono::duration<double>(1 / options_.frames_per_host_s);
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [this] { return stopping_ || watchers_ > 0; });
+    changed_.wait(lock, [this] { return stopping_ || !viewers_.empty(); });
     if (stopping_) return;
-    const bool stale = faults_->Get("stale_frame") > 0 && !jpeg_.empty();
-    if (!stale) {
-      lock.unlock();
-      std::string jpeg = Picture();
-      lock.lock();
-      jpeg_ = std::move(jpeg), ++rendered_;
-    }
-    ++number_;
-    changed_.notify_all();
-    changed_.wait_for(lock, period, [this] { return stopping_; });
+    TakePictures(lock);
   }
 }
 
-std::string EmulatedCamera::Next(uint64_t* number) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  ++watchers_;
+void EmulatedCamera::TakePictures(std::unique_lock<std::mutex>& lock) {
+  const auto wait = [&](double host_s) {
+    changed_.wait_for(lock, std::chrono::duration<double>(std::max(host_s, kAskAgainS)));
+    return !stopping_ && !viewers_.empty();
+  };
+  const double ahead_s = SimClock::kAheadHostS * clock_->speedup();
+  const double period_s = clock_->speedup() / options_.frames_per_host_s;
+  SimClock::Part part(clock_, [] {});
+  for (double exposure_s = clock_->NowS() + ahead_s;; exposure_s += period_s) {
+    part.Done(exposure_s - ahead_s);
+    while (!part.OthersDone(exposure_s))
+      if (!wait((exposure_s - clock_->NowS()) / clock_->speedup())) return;
+    Expose(lock);
+    while (!ReadByAll())
+      if (!wait(0)) return;
+  }
+}
+
+void EmulatedCamera::Expose(std::unique_lock<std::mutex>& lock) {
+  const bool stale = faults_->Get("stale_frame") > 0 && !jpeg_.empty();
+  if (!stale) {
+    lock.unlock();
+    std::string jpeg = Picture();
+    lock.lock();
+    jpeg_ = std::move(jpeg), ++rendered_;
+  }
+  ++number_;
   changed_.notify_all();
-  const uint64_t after = std::max(*number, number_);
-  changed_.wait(lock, [&] { return stopping_ || number_ > after; });
-  --watchers_;
-  *number = number_;
-  return stopping_ || faults_->UntilHostS("camera_unplug") > 0 ? std::string() : jpeg_;
+}
+
+bool EmulatedCamera::ReadByAll() {
+  bool all = true;
+  for (Viewer* viewer : viewers_) {
+    const size_t unread = UnreadOrUnderway(viewer->fd);
+    // One that has read everything is about to be sent more by a thread of our own.
+    if (viewer->patience.WaitsFor(unread) || (unread == 0 && viewer->sent < number_)) all = false;
+  }
+  return all;
+}
+
+bool EmulatedCamera::SendNext(LineConnection& connection, Viewer* viewer, const std::string& head,
+                              const std::string& tail) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [&] { return stopping_ || number_ > viewer->sent; });
+  if (stopping_ || faults_->UntilHostS("camera_unplug") > 0) return false;
+  const std::string jpeg = jpeg_;
+  const uint64_t number = number_;
+  lock.unlock();
+  const bool sent = connection.Send(head + std::to_string(jpeg.size()) + "\r\n\r\n" + jpeg + tail);
+  lock.lock();
+  viewer->sent = number;
+  changed_.notify_all();
+  return sent;
 }
 
 void EmulatedCamera::Serve(LineConnection& connection) {
@@ -128,26 +191,24 @@ void EmulatedCamera::Serve(LineConnection& connection) {
   if (!connection.ReadLine(&request)) return;
   while (connection.ReadLine(&line) && !line.empty()) {
   }
-  uint64_t number = 0;
   if (request.rfind("GET /frame.jpg", 0) == 0) {
-    const std::string jpeg = Next(&number);
-    if (jpeg.empty()) return;
-    connection.Send(
+    Viewer viewer(this, connection.fd());
+    SendNext(
+        connection, &viewer,
         "HTTP/1.0 200 OK\r\nContent-Type: image/jpeg\r\nX-Source: emulated camera\r\nConnection: close\r\n"
-        "Content-Length: " +
-        std::to_string(jpeg.size()) + "\r\n\r\n" + jpeg);
+        "Content-Length: ",
+        "");
   } else if (request.rfind("GET /video.mjpg", 0) == 0) {
+    Viewer viewer(this, connection.fd());
     bool open = connection.Send(
         std::string(
             "HTTP/1.0 200 OK\r\nX-Source: emulated camera\r\nConnection: close\r\nCache-Control: no-cache\r\n"
             "Content-Type: multipart/x-mixed-replace; boundary=") +
         kBoundary + "\r\n\r\n");
-    while (open) {
-      const std::string jpeg = Next(&number);
-      open = !jpeg.empty() && connection.Send(std::string("--") + kBoundary +
-                                              "\r\nContent-Type: image/jpeg\r\nContent-Length: " +
-                                              std::to_string(jpeg.size()) + "\r\n\r\n" + jpeg + "\r\n");
-    }
+    while (open)
+      open = SendNext(
+          connection, &viewer,
+          std::string("--") + kBoundary + "\r\nContent-Type: image/jpeg\r\nContent-Length: ", "\r\n");
   } else {
     connection.Send(
         "HTTP/1.0 404 Not Found\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"

@@ -7,15 +7,18 @@
 #include <turbojpeg.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cstdlib>
 #include <numeric>
 
 #include "server/geometry/supershape.h"
+#include "tests/rig/controller/net.h"
 
 namespace touchstone::rig {
 namespace {
 
-// What an HTTP client reads of a path, up to so many bytes or the end.
-std::string Get(int port, const std::string& path, size_t most = 1 << 22) {
+// A connection on which a path was asked for.
+int Ask(int port, const std::string& path) {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in where{};
   where.sin_family = AF_INET, where.sin_port = htons(static_cast<uint16_t>(port));
@@ -23,6 +26,12 @@ std::string Get(int port, const std::string& path, size_t most = 1 << 22) {
   EXPECT_EQ(connect(fd, reinterpret_cast<sockaddr*>(&where), sizeof where), 0);
   const std::string request = "GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n";
   EXPECT_EQ(send(fd, request.data(), request.size(), MSG_NOSIGNAL), static_cast<ssize_t>(request.size()));
+  return fd;
+}
+
+// What an HTTP client reads of a path, up to so many bytes or the end.
+std::string Get(int port, const std::string& path, size_t most = 1 << 22) {
+  const int fd = Ask(port, path);
   std::string all;
   char bytes[4096];
   for (ssize_t got; all.size() < most && (got = recv(fd, bytes, sizeof bytes, 0)) > 0;)
@@ -34,6 +43,15 @@ std::string Get(int port, const std::string& path, size_t most = 1 << 22) {
 std::string Body(const std::string& response) {
   const size_t head = response.find("\r\n\r\n");
   return head == std::string::npos ? "" : response.substr(head + 4);
+}
+
+// Reads up to and with these bytes; what came before them.
+std::string ReadUpTo(int fd, const std::string& end) {
+  std::string all;
+  for (char c; all.size() < end.size() || all.compare(all.size() - end.size(), end.size(), end) != 0;
+       all += c)
+    if (recv(fd, &c, 1, 0) != 1) return "";
+  return all.substr(0, all.size() - end.size());
 }
 
 // Grey levels of a JPEG; empty if it is none.
@@ -59,6 +77,7 @@ class EmulatedCameraTest : public testing::Test {
     camera_ = std::make_unique<EmulatedCamera>(
         CameraOptions(),
         [this] {
+          looked_s_ = clock_.NowS();
           CameraView view;
           view.surface = surface_;
           // From 0.4 m above, looking down.
@@ -66,8 +85,16 @@ class EmulatedCameraTest : public testing::Test {
           view.mesh_from_camera.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal().toDenseMatrix();
           return view;
         },
-        &faults_);
+        &clock_, &faults_);
   }
+  // Until the clock is there; a busy machine may take its time.
+  void AwaitTime(double sim_s) {
+    const double until_s = HostNowS() + 60;
+    while (clock_.NowS() < sim_s) ASSERT_LT(HostNowS(), until_s);
+  }
+
+  SimClock clock_{1000};
+  std::atomic<double> looked_s_{0};
   Faults faults_;
   std::shared_ptr<const geometry::Surface> surface_;
   std::unique_ptr<EmulatedCamera> camera_;
@@ -100,6 +127,30 @@ TEST_F(EmulatedCameraTest, StreamsPictureAfterPicture) {
   for (size_t at = 0; (at = stream.find("Content-Type: image/jpeg", at)) != std::string::npos; ++at) ++parts;
   EXPECT_GE(parts, 2u);
   EXPECT_NE(Get(camera_->port(), "/else").find("404"), std::string::npos);
+}
+
+TEST_F(EmulatedCameraTest, LetsTimeStandFromAnExposureUntilThePictureWasRead) {
+  const int fd = Ask(camera_->port(), "/video.mjpg");
+  const double period_s = clock_.speedup() / CameraOptions().frames_per_host_s;
+  double before_s = 0;
+  for (int k = 0; k < 3; ++k) {
+    ReadUpTo(fd, "Content-Length: ");
+    const int bytes = std::atoi(ReadUpTo(fd, "\r\n\r\n").c_str());
+    ASSERT_GT(bytes, 1000);
+    const double looked_s = looked_s_;
+    EXPECT_NEAR(clock_.NowS(), looked_s, 1e-6) << k;
+    if (k > 0) {
+      EXPECT_NEAR(looked_s - before_s, period_s, 1e-6) << k;
+    }
+    before_s = looked_s;
+    std::string picture(bytes + 2, 0);
+    ASSERT_EQ(recv(fd, picture.data(), picture.size(), MSG_WAITALL), static_cast<ssize_t>(picture.size()));
+    AwaitTime(looked_s + 0.1 * period_s);
+  }
+  // Who has left without reading is not waited for.
+  ReadUpTo(fd, "Content-Length: ");
+  close(fd);
+  AwaitTime(before_s + 3 * period_s);
 }
 
 TEST_F(EmulatedCameraTest, IsGoneWhileItIsUnplugged) {
