@@ -127,7 +127,7 @@ def emulated_rig(folder, circle):
             for effect, (parameter, values, *thing) in circle.hidden.items()]
     unlisted = [f"--unlisted={circle.unlisted}"] if circle.unlisted else []
     emulator = [BIN / "touchstone-rig-emulator", "--dir", folder / "rig", "--speedup", circle.speedup,
-                "--sigma-us", SIGMA_US, "--seed", circle.seed, "--finger-give-mm", 1000, *hide, *unlisted]
+                "--sigma-us", SIGMA_US, "--seed", circle.seed, "--finger-give-mm", 1000, "--no-camera", *hide, *unlisted]
     gateway = [BIN / "touchstone-gateway", "--listen", "127.0.0.1:0", "--config"]
     with started("ready ", folder / "emulator.log", *emulator) as config:
         with started("listening on ", folder / "gateway.log", *gateway, config) as address:

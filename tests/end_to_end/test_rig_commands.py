@@ -57,7 +57,7 @@ def emulated_rig(folder, speedup, *flags):
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "7", "--sigma-us", str(HIDDEN_SIGMA_US), "--hide",
+    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--no-camera", "--seed", "7", "--sigma-us", str(HIDDEN_SIGMA_US), "--hide",
                       "finger_length.offset_mm=" + ",".join(map(str, HIDDEN_OFFSETS_MM))) as address:
         yield address
 
@@ -99,7 +99,14 @@ def journal_of_gateway(rig):
     return {entry["name"]: entry for entry in sessions}
 
 
-def test_status_shows_every_part_and_that_it_is_emulated(rig):
+@pytest.fixture
+def rig_with_camera(tmp_path):
+    with emulated_rig(tmp_path / "rig", SPEEDUP) as address:
+        yield address
+
+
+def test_status_shows_every_part_and_that_it_is_emulated(rig_with_camera):
+    rig = rig_with_camera
     # Looking powers nothing on.
     assert "POWER_OFF" in touchstone("rig", "status", server=rig)
     touchstone("rig", "power-on", server=rig)

@@ -105,7 +105,7 @@ def emulated_rig(folder: str, speedup: float = 50) -> Program:
 
     Its fingers give 50 mm: at 20 mm/s a gateway that does not get the processor for 2.5 s / speedup lets them be pushed too far.
     """
-    return Program([EMULATOR, "--dir", folder, "--speedup", speedup, "--powered", "--object", "lat20", *SMALL], r"ready (\S+)")
+    return Program([EMULATOR, "--dir", folder, "--speedup", speedup, "--powered", "--object", "lat20", "--no-camera", *SMALL], r"ready (\S+)")
 
 
 class Server(Program):

@@ -31,6 +31,7 @@ struct EmulatorOptions {
   int supershape_triangles = 20'000;   // as the virtual source has them
   std::string object, up_face = "+z";  // mounted from the beginning; empty: nothing
 
+  bool camera = true;  // gateway.toml names it
   int camera_width = 640, camera_height = 480, jpeg_quality = 90;
 
   double speedup = 1;  // simulated seconds in one of the host's

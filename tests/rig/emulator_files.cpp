@@ -101,10 +101,11 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
   text += absl::StrFormat(
       "\n[effector]\nport = %s\nbaud = 115200\nfingers = %d\nspacing_mm = %.9g\nsensor = %s\n",
       Quoted(dir + "/effector"), options.fingers, options.spacing_mm, Quoted(options.sensor));
-  text += absl::StrFormat(
-      "\n[camera]\nuri = %s\nvertical_fov_deg = %.9g\n",
-      Quoted("http://" + options.address + ":" + std::to_string(addresses.camera_port) + "/video.mjpg"),
-      kVerticalFovDeg);
+  if (options.camera)
+    text += absl::StrFormat(
+        "\n[camera]\nuri = %s\nvertical_fov_deg = %.9g\n",
+        Quoted("http://" + options.address + ":" + std::to_string(addresses.camera_port) + "/video.mjpg"),
+        kVerticalFovDeg);
   // The plate lies below the arm's base, and an approach may be told to end just above it.
   text += absl::StrFormat("\n[limits]\nbox_min_mm = [-500, -500, %.9g]\npayload_cog_mm = [0, 0, 45]\n",
                           kPlateZM * 1e3);

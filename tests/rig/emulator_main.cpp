@@ -80,6 +80,8 @@ int main(int argc, char** argv) {
       "--hide", options.hide,
       "Hidden effect, EFFECT.PARAMETER=VALUE[,VALUE...]; names and units of the catalogue; of touches, or "
       "of the camera (tests/rig/README.md)");
+  app.add_flag("!--no-camera", options.camera,
+               "gateway.toml names no camera: touches are quicker where nobody watches");
   app.add_option("--camera-width", options.camera_width, "Of its pictures, pixels");
   app.add_option("--camera-height", options.camera_height, "Of its pictures, pixels");
   app.add_option("--jpeg-quality", options.jpeg_quality, "Of its pictures, 1 to 100");
