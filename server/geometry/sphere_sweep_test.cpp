@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "server/base/sanitizers.h"
+#include "server/base/test_tier.h"
 #include "server/geometry/brute_force_oracle.h"
 #include "server/geometry/supershape.h"
 #include "server/geometry/surface.h"
@@ -144,7 +145,7 @@ TEST(SweepSpheres, AgreeWithTheDistanceToEveryTriangle) {
     SCOPED_TRACE(name);
     std::printf("%s\n", name);
     for (const double radius_m : {0.0003, 0.003, 0.02})
-      ExpectOracle(mesh, AimedLines(mesh, kUnderSanitizers ? 30 : 300, 13), radius_m);
+      ExpectOracle(mesh, AimedLines(mesh, SecondTierRuns() && !kUnderSanitizers ? 300 : 30, 13), radius_m);
   }
 }
 

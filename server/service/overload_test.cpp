@@ -1,6 +1,7 @@
 // Requests and clients that ask for too much: each is refused with the limit's name and value, and nobody else notices.
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
+#include <grpc/grpc.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -26,6 +27,9 @@ using testing::HasSubstr;
 
 class OverloadTest : public testing::Test {
  protected:
+  // Where the last object of gRPC 1.51 ends, it waits up to ten seconds for a thread of its own that polls.
+  static void SetUpTestSuite() { grpc_init(); }
+
   void Start(ServerOptions options = {}) {
     options.listen = "127.0.0.1:0";
     options.supershape_triangles = 2000;
