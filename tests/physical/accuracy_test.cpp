@@ -48,7 +48,8 @@ TEST_F(Accuracy, PosesAtContactAreWhereTheTipWas) {
     for (int i = 1; i < 3; ++i) {
       const double lower_m = measured.base_from_tip_at_contact(0).position_m().z() -
                              measured.base_from_tip_at_contact(i).position_m().z();
-      EXPECT_NEAR(lower_m, 0.02 * (truth.reported_s[i] - truth.reported_s[0]), 2e-5);
+      // The pose of a contact comes from states of 7 um of noise each, twice as good from four times as many.
+      EXPECT_NEAR(lower_m, 0.02 * (truth.reported_s[i] - truth.reported_s[0]), Cb3() ? 4e-5 : 2e-5);
     }
   }
 }

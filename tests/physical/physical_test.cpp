@@ -73,13 +73,18 @@ PhysicalTest::~PhysicalTest() {
   emulator_ = nullptr;
 }
 
+bool PhysicalTest::Cb3() {
+  const char* arm = std::getenv("TOUCHSTONE_TEST_ARM");
+  return arm != nullptr && std::string(arm) == "ur3";
+}
+
 void PhysicalTest::StartRig(const std::function<void(rig::EmulatorOptions*)>& change) {
   rig::EmulatorOptions options;
   options.dir = folder_.Path("rig");
   options.speedup = 40;
   options.supershape_triangles = 2000;
   options.powered = true;
-  if (const char* arm = std::getenv("TOUCHSTONE_TEST_ARM")) options.arm = arm;  // ur3: a CB3 controller
+  if (Cb3()) options.arm = "ur3";
   if (change) change(&options);
   emulator_ = rig::Emulator::Start(options);
 }

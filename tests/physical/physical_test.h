@@ -46,6 +46,9 @@ class PhysicalTest : public testing::Test {
  protected:
   ~PhysicalTest() override;
 
+  // The tests were started for a CB3 controller, which sends a quarter of the states: TOUCHSTONE_TEST_ARM is ur3.
+  static bool Cb3();
+
   // With changes to the emulator's options before it begins. Touches from above of lat00 need no change
   // of the object.
   void StartRig(const std::function<void(rig::EmulatorOptions*)>& change = nullptr);

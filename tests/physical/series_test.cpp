@@ -1,7 +1,4 @@
 // What differs between the series of controllers: e-Series, and CB3 where TOUCHSTONE_TEST_ARM is ur3.
-#include <cstdlib>
-#include <cstring>
-
 #include <gmock/gmock.h>
 
 #include "tests/physical/safety_fixture.h"
@@ -11,13 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class Series : public Safety {
- protected:
-  static bool Cb3() {
-    const char* arm = std::getenv("TOUCHSTONE_TEST_ARM");
-    return arm != nullptr && std::strcmp(arm, "ur3") == 0;
-  }
-};
+class Series : public Safety {};
 
 TEST_F(Series, IsTheOneThatTheTestsWereStartedFor) {
   StartRig([](rig::EmulatorOptions* options) { options->speedup = 1; });
