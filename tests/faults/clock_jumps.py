@@ -96,16 +96,17 @@ def _limits(folder: str, names: tuple[str, ...], result: Result) -> None:
 
 
 def _ends(call) -> bool:
-    """Whether a stream's status arrives; what it holds until then is read, slowly enough that it counts as unread."""
+    """Whether a stream's status arrives; what it holds until then is read, in steps so far apart that it counts as unread."""
     ended = threading.Event()
     call.add_callback(ended.set)
-    time.sleep(2.5)
-    with contextlib.suppress(grpc.RpcError):
-        for _ in range(1000):
-            next(call)
-            if ended.is_set():
-                break
-    return ended.wait(BUSY_S)
+    deadline = time.monotonic() + BUSY_S
+    while not ended.wait(2.5) and time.monotonic() < deadline:
+        with contextlib.suppress(grpc.RpcError):
+            for _ in range(1000):
+                next(call)
+                if ended.is_set():
+                    break
+    return ended.is_set()
 
 
 def _rig(folder: str, jumps: int, names: tuple[str, ...], result: Result) -> None:
