@@ -19,16 +19,6 @@ SingularValues SingularValuesOf(const Eigen::MatrixXd& matrix) {
   return {svd.singularValues(), svd.matrixU(), svd.matrixV()};
 }
 
-Eigen::VectorXd SingularValues::Solve(const Eigen::VectorXd& right) const {
-  // As Eigen's own rank: what is smaller than this is zero but for rounding.
-  const double least =
-      values.size() > 0 ? values[0] * static_cast<double>(values.size()) * Eigen::NumTraits<double>::epsilon()
-                        : 0;
-  Eigen::VectorXd parts = u.transpose() * right;
-  for (Eigen::Index k = 0; k < values.size(); ++k) parts[k] = values[k] > least ? parts[k] / values[k] : 0;
-  return v.leftCols(values.size()) * parts;
-}
-
 Eigen::VectorXd SolveLeastSquares(const Eigen::MatrixXd& columns, const Eigen::VectorXd& values) {
   return columns.colPivHouseholderQr().solve(values);
 }

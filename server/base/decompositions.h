@@ -1,5 +1,5 @@
-// Decompositions of matrices whose sizes are known at run time. Eigen's are instantiated in decompositions.cpp alone: each
-// takes two to ten seconds of every file that uses it.
+// Decompositions of matrices whose sizes are known at run time. What stands here is instantiated in decompositions.cpp alone:
+// each of Eigen's takes two to ten seconds of every file that uses it directly.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -22,9 +22,6 @@ struct SingularValues {
   Eigen::VectorXd values;  // descending, never negative
   Eigen::MatrixXd u;       // as many columns as there are values
   Eigen::MatrixXd v;       // square: the columns beyond the values span the null space
-
-  // The x of least |x| among those of least |matrix * x - right|.
-  Eigen::VectorXd Solve(const Eigen::VectorXd& right) const;
 };
 SingularValues SingularValuesOf(const Eigen::MatrixXd& matrix);
 

@@ -34,10 +34,10 @@ TEST(SingularValues, OfFewerRowsThanColumnsTellTheNullSpace) {
   EXPECT_NEAR((matrix * svd.v.rightCols(2)).norm(), 0, 1e-14);
 }
 
-TEST(SingularValues, SolveGivesTheShortestOfTheNearest) {
+TEST(ColumnSpan, SolveGivesTheShortestOfTheNearest) {
   Eigen::MatrixXd matrix(2, 2);
   matrix << 1, 1, 1, 1;  // only the sum is determined
-  const Eigen::VectorXd x = SingularValuesOf(matrix).Solve(Eigen::Vector2d(3, 5));
+  const Eigen::VectorXd x = ColumnSpan(matrix).Solve(Eigen::Vector2d(3, 5));
   EXPECT_TRUE(x.isApprox(Eigen::Vector2d(2, 2), 1e-14)) << x.transpose();
 }
 

@@ -41,7 +41,7 @@ absl::StatusOr<ToolCalibration> CalibrateTool(const std::vector<Eigen::Isometry3
                         "the tool by 20 degrees and more about two axes across that direction",
                         poses, unknown.x(), unknown.y(), unknown.z()));
   }
-  const Eigen::VectorXd solution = svd.Solve(right);
+  const Eigen::VectorXd solution = SolveLeastSquares(lines, right);
   const Eigen::VectorXd rest = lines * solution - right;
 
   ToolCalibration tool;
