@@ -1,11 +1,10 @@
 #include "server/diagnosis/images/photo_search.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 
+#include "server/base/decompositions.h"
 #include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/image_field.h"
@@ -76,7 +75,7 @@ bool IsSeen(const inference::Fit& fit, int index, const Eigen::MatrixXd& covaria
   const Eigen::VectorXd scale = part.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::VectorXd scaled = scale.cwiseProduct(value);
   const Eigen::MatrixXd correlation = scale.asDiagonal() * part * scale.asDiagonal();
-  const double wald = scaled.dot(correlation.ldlt().solve(scaled));
+  const double wald = scaled.dot(SymmetricSolver(correlation).Solve(scaled));
   return ChiSquaredTail(wald, n) < kStepP;
 }
 

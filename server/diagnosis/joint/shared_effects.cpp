@@ -1,12 +1,12 @@
 #include "server/diagnosis/joint/shared_effects.h"
 
 #include <absl/strings/str_cat.h>
-#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 
+#include "server/base/decompositions.h"
 #include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_quality.h"
@@ -41,7 +41,7 @@ double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covarianc
       correlation(a, b) = covariance(known[a], known[b]) /
                           std::sqrt(covariance(known[a], known[a]) * covariance(known[b], known[b]));
   }
-  const double wald = scaled.dot(correlation.ldlt().solve(scaled));
+  const double wald = scaled.dot(SymmetricSolver(correlation).Solve(scaled));
   return ChiSquaredTail(wald, n);
 }
 
