@@ -34,8 +34,16 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
   if (!status.ok())
     return absl::Status(status.code(), absl::StrCat("THE STOP WAS NOT CONFIRMED: ", status.message(),
                                                     "; use the emergency stop if anything moves"));
-  if (cli.output().json) PrintJson({{"aborted_touches", response.aborted_touches()}});
-  cli.Log(absl::StrCat("stopped; ", Counted(response.aborted_touches(), "touch was", "touches were"),
+  if (cli.output().json)
+    PrintJson({{"aborted_touches", response.aborted_touches()}, {"standstill", response.standstill()}});
+  if (!response.standstill())
+    return absl::UnavailableError(absl::StrCat(
+        "THE STOP WAS SENT, BUT NOT CONFIRMED: ",
+        response.not_confirmed().empty() ? "the gateway does not say whether the arm stands still; press the emergency "
+                                           "stop if anything moves"
+                                         : response.not_confirmed(),
+        ". It holds until somebody releases it: touchstone rig reset --reason TEXT"));
+  cli.Log(absl::StrCat("stopped, and nothing moves; ", Counted(response.aborted_touches(), "touch was", "touches were"),
                        " under way. This is a software stop and not safety-rated. It holds until somebody "
                        "releases it: touchstone "
                        "rig reset --reason TEXT"));

@@ -41,6 +41,7 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
       context->peer(),
       request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxReasonBytes), running);
   response->set_aborted_touches(running);
+  response->set_standstill(true);
   return grpc::Status::OK;
 }
 

@@ -191,6 +191,7 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
 GatewayServer::~GatewayServer() {
   parts_->pages.reset();
   if (parts_->server == nullptr) return;
+  if (parts_->rig != nullptr) parts_->rig->Close();
   parts_->resources.draining = true;
   if (parts_->acceptor != nullptr) parts_->acceptor->End();
   parts_->server->Shutdown(std::chrono::system_clock::now());
@@ -206,7 +207,8 @@ source::RigDevice& GatewayServer::device() {
 }
 
 void GatewayServer::Drain() {
-  // Running motions see this within a tick and stop the arm.
+  // What moves is stopped, and latches: whoever asks the next gateway moves nothing before a person has looked.
+  if (parts_->rig != nullptr) parts_->rig->Close();
   parts_->resources.draining = true;
   if (parts_->pages != nullptr) parts_->pages->StopAsking();
   if (parts_->acceptor != nullptr) parts_->acceptor->End();

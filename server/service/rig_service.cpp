@@ -146,7 +146,10 @@ grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::Sto
   const std::string who = request->holder().empty() && caller.name.empty()
                               ? context->peer()
                               : absl::StrCat(WithCaller(said, caller), " at ", context->peer());
-  response->set_aborted_touches(rig_->Stop(reason, who));
+  const gateway::StopOutcome outcome = rig_->Stop(reason, who);
+  response->set_aborted_touches(outcome.motions);
+  response->set_standstill(outcome.standstill.ok());
+  response->set_not_confirmed(std::string(outcome.standstill.message()));
   spdlog::warn("stop from {}: {}", who, reason);
   return grpc::Status::OK;
 }

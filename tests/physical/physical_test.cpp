@@ -145,6 +145,11 @@ void PhysicalTest::KillGatewayProcess() {
   process_ = 0;
 }
 
+void PhysicalTest::AwaitGatewayProcess() {
+  waitpid(process_, nullptr, 0);
+  process_ = 0;
+}
+
 void PhysicalTest::Connect(int port) {
   channel_ = grpc::CreateChannel("127.0.0.1:" + std::to_string(port), grpc::InsecureChannelCredentials());
   source_ = v1::Source::NewStub(channel_);
@@ -203,6 +208,11 @@ void PhysicalTest::WaitUntil(const std::function<bool()>& done, const char* what
 
 void PhysicalTest::WaitUntilApproaching() {
   WaitUntil([this] { return RigState().arm().phase() == v1::MOTION_PHASE_APPROACH; }, "the arm approaches");
+}
+
+void PhysicalTest::WaitUntilApproachingAfter(uint32_t program_id) {
+  WaitUntil([&] { return RigState().arm().program_id() != program_id; }, "another program begins");
+  WaitUntilApproaching();
 }
 
 void PhysicalTest::SendToDashboard(const std::string& line) {

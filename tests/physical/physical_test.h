@@ -58,6 +58,7 @@ class PhysicalTest : public testing::Test {
   void StopGateway();
   void StartGatewayProcess();
   void KillGatewayProcess();
+  void AwaitGatewayProcess();  // it was told to end
   pid_t gateway_process() const { return process_; }  // 0: none
 
   // A touch of lat00 from above, 10 mm to the side for every unit of `which`.
@@ -72,8 +73,9 @@ class PhysicalTest : public testing::Test {
                                  const std::string& id);
   // Waits, a minute at most.
   static void WaitUntil(const std::function<bool()>& done, const char* what);
-  // Until the approach of the arm has come so far, rig metres.
   void WaitUntilApproaching();
+  // Of another program than this one, whose phase the controller's registers keep.
+  void WaitUntilApproachingAfter(uint32_t program_id);
   // What a person does at the teach pendant after a protective stop.
   void UnlockByHand();
   // Likewise: one line, and whatever the answer is.

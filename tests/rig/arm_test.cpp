@@ -114,6 +114,16 @@ class EmulatedArm : public testing::Test {
     touch.speed_m_s = speed_m_s;
     return touch;
   }
+  // Sends the program, and lets it go once it waits.
+  absl::Status LetGo(uint32_t program_id, const absl::Status& sent) {
+    if (!sent.ok()) return sent;
+    if (!WaitForPhase(program_id, gateway::arm::MotionPhase::kNone))
+      return absl::UnavailableError("the program does not wait to be let go");
+    return arm_->BeginMotion(program_id);
+  }
+  absl::Status Start(const gateway::arm::ArmTouch& touch) {
+    return LetGo(touch.program_id, arm_->StartTouch(touch));
+  }
   void PassRigTime(double seconds) {
     const double until_s = clock_.NowS() + seconds;
     EXPECT_TRUE(Wait([&] { return clock_.NowS() >= until_s; }));
@@ -148,7 +158,7 @@ TEST_F(EmulatedArm, TellsWhereTheTipIsBeforeAnyToolWasSet) {
 TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
   Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(7);
-  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(Start(touch).ok());
   ASSERT_TRUE(WaitForPhase(7, gateway::arm::MotionPhase::kReady));
   EXPECT_LT((controller_->BaseFromTip().translation() - touch.transit.back().translation()).norm(), 1e-4);
   ASSERT_TRUE(arm_->BeginApproach(7).ok());
@@ -170,7 +180,7 @@ TEST_F(EmulatedArm, TouchRunsThroughItsPhasesAndEndsWhereItBegan) {
 TEST_F(EmulatedArm, ApproachEndsWhenItIsToldTo) {
   Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(8, 0.002);
-  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(Start(touch).ok());
   ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(8).ok());
   ASSERT_TRUE(WaitForPhase(8, gateway::arm::MotionPhase::kApproach));
@@ -190,7 +200,7 @@ TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
   const gateway::arm::ArmTouch touch = SomeTouch(9);
   gateway::arm::Joints joints = options_.joints_rad;
   joints[0] += 0.2;
-  ASSERT_TRUE(arm_->MoveThrough(9, touch.transit, {joints}).ok());
+  ASSERT_TRUE(LetGo(9, arm_->MoveThrough(9, touch.transit, {joints})).ok());
   ASSERT_TRUE(WaitForPhase(9, gateway::arm::MotionPhase::kDone));
   EXPECT_LT(gateway::arm::Farthest(arm_->State()->joints_rad, joints), 1e-3);
 }
@@ -198,14 +208,14 @@ TEST_F(EmulatedArm, MovesThroughPosesToJoints) {
 TEST_F(EmulatedArm, StopEndsAMotionAndTheNextOneRuns) {
   Heart heart(arm_.get(), &clock_);
   const gateway::arm::ArmTouch touch = SomeTouch(10, 0.002);
-  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(Start(touch).ok());
   ASSERT_TRUE(WaitForPhase(10, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(10).ok());
   ASSERT_TRUE(WaitForPhase(10, gateway::arm::MotionPhase::kApproach));
   ASSERT_TRUE(arm_->Stop().ok());
   ExpectAtRestSoon();
   EXPECT_EQ(arm_->State()->phase, gateway::arm::MotionPhase::kApproach) << "it tells how far it came";
-  ASSERT_TRUE(arm_->StartTouch(SomeTouch(11)).ok());
+  ASSERT_TRUE(Start(SomeTouch(11)).ok());
   EXPECT_TRUE(WaitForPhase(11, gateway::arm::MotionPhase::kReady));
 }
 
@@ -245,11 +255,52 @@ TEST_F(EmulatedArm, ProgramThatIsStoppedAfterItsGuardHasAnsweredDoesNotRun) {
 
 TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
   Heart heart(arm_.get(), &clock_);
-  ASSERT_TRUE(arm_->StartTouch(SomeTouch(12)).ok());
+  ASSERT_TRUE(Start(SomeTouch(12)).ok());
   ASSERT_TRUE(WaitForProgram(12));
   faults_.Set("disconnect", 1);
   // Whatever is up again first carries it.
   EXPECT_TRUE(Wait([&] { return arm_->Stop().ok(); }));
+  ExpectAtRestSoon();
+}
+
+// What was sent moves nothing until it is let go: a network may deliver it at any time.
+TEST_F(EmulatedArm, ProgramThatWasSentWaitsAtRestUntilItIsLetGo) {
+  Heart heart(arm_.get(), &clock_);
+  const gateway::arm::ArmTouch touch = SomeTouch(40);
+  const uint64_t motions = controller_->Count("motions");
+  ASSERT_TRUE(arm_->StartTouch(touch).ok());
+  ASSERT_TRUE(WaitForPhase(40, gateway::arm::MotionPhase::kNone));
+  PassRigTime(3);
+  EXPECT_EQ(controller_->Count("motions"), motions);
+  EXPECT_EQ(arm_->State()->runtime_state, gateway::arm::RuntimeState::kPlaying);
+  ASSERT_TRUE(arm_->BeginMotion(40).ok());
+  EXPECT_TRUE(WaitForPhase(40, gateway::arm::MotionPhase::kReady));
+}
+
+TEST_F(EmulatedArm, ProgramOfSomebodyElseIsToldWithItsNameAndOwnOnesAreNot) {
+  Heart heart(arm_.get(), &clock_);
+  ASSERT_TRUE(Start(SomeTouch(41)).ok());
+  ASSERT_TRUE(WaitForPhase(41, gateway::arm::MotionPhase::kReady));
+  ASSERT_TRUE(arm_->Stop().ok());
+  ExpectAtRestSoon();
+  EXPECT_EQ(arm_->Foreign().count, 0u);
+  rig::TestClient other(controller_->ports().secondary);
+  other.Send("def pick_and_place():\n  movej([0,-1.5,-1.5,-1.5,1.5,0])\nend\n");
+  EXPECT_TRUE(Wait([&] { return arm_->Foreign().count == 1; }));
+  EXPECT_EQ(arm_->Foreign().newest, "pick_and_place");
+}
+
+// The watchdog ends what does not heed the stop, for instance a controller that was switched to local control: no heartbeat
+// goes out after it.
+TEST_F(EmulatedArm, StopEndsTheHeartbeatsAtOnce) {
+  Heart heart(arm_.get(), &clock_);
+  ASSERT_TRUE(Start(SomeTouch(42, 0.001)).ok());
+  ASSERT_TRUE(WaitForPhase(42, gateway::arm::MotionPhase::kReady));
+  ASSERT_TRUE(arm_->BeginApproach(42).ok());
+  ASSERT_TRUE(WaitForPhase(42, gateway::arm::MotionPhase::kApproach));
+  faults_.Set("local_control", 1);
+  ASSERT_TRUE(arm_->Stop().ok()) << "it was sent; the controller says nothing";
+  EXPECT_TRUE(Wait([&] { return controller_->Count("watchdog_stops") > 0; }));
   ExpectAtRestSoon();
 }
 
@@ -269,7 +320,7 @@ TEST_F(EmulatedArm, ControllerGetsTheCentreOfGravityOfThePayload) {
 
 TEST_F(EmulatedArm, WatchdogStopsItWhenNobodyBeats) {
   Heart heart(arm_.get(), &clock_);
-  ASSERT_TRUE(arm_->StartTouch(SomeTouch(13, 0.001)).ok());
+  ASSERT_TRUE(Start(SomeTouch(13, 0.001)).ok());
   ASSERT_TRUE(WaitForPhase(13, gateway::arm::MotionPhase::kReady));
   ASSERT_TRUE(arm_->BeginApproach(13).ok());
   ASSERT_TRUE(WaitForPhase(13, gateway::arm::MotionPhase::kApproach));
@@ -312,7 +363,7 @@ TEST_F(EmulatedArm, ConnectsAgainAfterEveryConnectionWasClosed) {
     return state.ok() && state->controller_time_s > before_s;
   }));
   Heart heart(arm_.get(), &clock_);
-  ASSERT_TRUE(arm_->StartTouch(SomeTouch(16)).ok());
+  ASSERT_TRUE(Start(SomeTouch(16)).ok());
   EXPECT_TRUE(WaitForPhase(16, gateway::arm::MotionPhase::kReady));
 }
 

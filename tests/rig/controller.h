@@ -47,6 +47,7 @@ class Controller {
   // A hand turns the joints so, at once. An error text if the arm is not free (freedrive, teach mode); else empty.
   virtual std::string MoveByHand(const std::array<double, 6>& joints_rad) = 0;
   virtual bool Free() const = 0;
+  virtual bool ProgramRuns() const = 0;  // or is paused
   // How often something happened: "programs" and "motions" that began, "protective_stops", "watchdog_stops"
   // (programs that a watchdog ended or paused).
   virtual uint64_t Count(const std::string& what) const = 0;

@@ -43,7 +43,7 @@ struct EmulatorOptions {
   bool unplug_resets = false;                          // the device takes its power from the line
   std::vector<std::pair<std::string, double>> faults;  // from the beginning
   bool calibrated = false;                             // the arm's kinematics have deltas of their own
-  bool powered = false;                                // the arm; else it is off as after switching on
+  bool powered = true;                                 // the arm; else it is off as after switching on
   double finger_give_mm = 60;                          // farther beyond a contact: protective stop
   // The program that gateway.toml's mount_command calls; empty: touchstone-rig-emulator beside the running
   // program, and no mount_command if there is none.

@@ -16,7 +16,7 @@ from .connection import Connection, Retry, Targets
 from .credentials import Credentials
 from .dataset import Dataset
 from .diagnosis import Diagnosis
-from .errors import InvalidRequest, TouchstoneError
+from .errors import InvalidRequest, SourceFailed, TouchstoneError
 from .images import ImageLike, Views, image as default_image, to_image, to_views
 from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
@@ -146,9 +146,17 @@ class Client(Diagnosis):
         return Session(self, name, take_lease)
 
     def stop(self, reason: str = "") -> int:
-        """Ends every motion now; needs no lease. Not safety-rated. Returns how many touches were under way."""
+        """Ends every motion now; needs no lease. Not safety-rated. Returns how many touches were under way.
+
+        Raises:
+          SourceFailed: the stop was sent, but the arm was not seen at rest: press the emergency stop if anything moves.
+        """
         request = control_pb2.StopRequest(reason=reason or "client.stop()", holder=lease_holder())
         answer: control_pb2.StopResponse = self._connection.call(_CONTROL, "Stop", request, timeout_s=5.0, repeat=False)
+        if not answer.standstill:
+            raise SourceFailed("the stop was sent, but " + (answer.not_confirmed or "the gateway does not say whether the "
+                               "arm stands still: press the emergency stop if anything moves"),
+                               "UNAVAILABLE", self.target)
         return answer.aborted_touches
 
     def call(self, stub: type, method: str, request: Any, **how: Any) -> Any:

@@ -32,7 +32,8 @@ enum class RobotMode : int {
   kUpdatingFirmware = 8,
 };
 
-// Likewise (output safety_mode).
+// Likewise (output safety_mode). The numbers beyond 9 are those of Universal Robots' client library (ur_client_library,
+// ur/datatypes.h) and of its ROS messages (ur_dashboard_msgs, SafetyStatus).
 enum class SafetyMode : int {
   kUnspecified = 0,
   kNormal = 1,
@@ -44,6 +45,19 @@ enum class SafetyMode : int {
   kRobotEmergencyStop = 7,
   kViolation = 8,
   kFault = 9,
+  kValidateJointId = 10,
+  kUndefined = 11,
+  kAutomaticModeSafeguardStop = 12,
+  kSystemThreePositionEnablingStop = 13,
+  kPendantThreePositionEnablingStop = 14,
+  kImmiEmergencyStop = 15,
+  kImmiSafeguardStop = 16,
+  kProfisafeWaitingForParameters = 17,
+  kProfisafeAutomaticModeSafeguardStop = 18,
+  kProfisafeSafeguardStop = 19,
+  kProfisafeEmergencyStop = 20,
+  kSafetyApiSafeguardStop = 22,
+  kIoPlaneStop = 23,
 };
 
 // Of the program on the controller, likewise (output runtime_state).
@@ -58,7 +72,7 @@ enum class RuntimeState : int {
 
 // What a program of this gateway is doing; the numbers stand in a register of the controller.
 enum class MotionPhase : int {
-  kNone = 0,
+  kNone = 0,     // its settings are made; it waits for BeginMotion, at rest
   kTransit = 1,  // to the start
   kReady = 2,    // at the start and at rest; waits for BeginApproach
   kApproach = 3,
@@ -94,6 +108,11 @@ struct ArmTouch {
   double duration_s = 0;  // expected, in all, rig seconds
 };
 
+struct ForeignPrograms {
+  uint64_t count = 0;
+  std::string newest;  // its name, as the controller tells it
+};
+
 // Asked right before something that starts motion goes out: its error keeps that from going and is returned. A stop
 // that comes later than the answer reaches the controller behind what was sent. Null: nothing forbids it.
 using StartGuard = std::function<absl::Status()>;
@@ -111,8 +130,13 @@ class Arm {
   // safety mode normal, program run possible.
   virtual absl::Status Ready() const = 0;
 
+  // A program that is sent makes its settings (tool, payload, watchdog) and waits, at rest, in phase kNone; it moves once
+  // BeginMotion was called.
+
   // Sends the program of a touch; it goes to the start and waits there (kReady). The caller watches State().
   virtual absl::Status StartTouch(const ArmTouch& touch, const StartGuard& guard = nullptr) = 0;
+  // At kNone: the program that waits begins to move.
+  virtual absl::Status BeginMotion(uint32_t program_id, const StartGuard& guard = nullptr) = 0;
   // At kReady: begins the approach.
   virtual absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard = nullptr) = 0;
   // Every finger has reported: the approach stops and the tool retracts to the start (kRetract, kDone).
@@ -127,8 +151,13 @@ class Arm {
     return absl::UnimplementedError(
         absl::StrCat("program ", program_id, ": this arm cannot be guided by hand"));
   }
-  // Stops whatever moves, now, from any thread: on the wire before it returns, never queued behind anything.
+  // Stops whatever moves, now, from any thread: on the wire before it returns, never queued behind anything. From now on
+  // no heartbeat is sent until the next program.
   virtual absl::Status Stop() = 0;
+  // The same by another way than Stop takes first, for a controller that does not heed that one.
+  virtual absl::Status StopOtherwise() = 0;
+  // Programs that began on the controller without being sent by this object, since it was made.
+  virtual ForeignPrograms Foreign() const { return {}; }
   // Powers on and releases the brakes if they are not; never unlocks a protective stop. `guard` is asked before
   // each step, with nothing between its answer and the step, and while the controller works on it. Its error ends the
   // wait and is returned, and an arm that this call was powering up is powered off again: else it would release its

@@ -7,7 +7,7 @@ namespace touchstone::gateway::arm {
 // The gateway writes (RTDE inputs).
 inline constexpr int kHeartbeatRegister = 24;  // input_int_register_24: counts; watched by rtde_set_watchdog
 inline constexpr int kCommandRegister = 25;    // input_int_register_25: 4 * (program id mod 2^28) + command
-inline constexpr int kCommandGo = 1, kCommandRetract = 2;
+inline constexpr int kCommandGo = 1, kCommandRetract = 2, kCommandMove = 3;
 
 // The program writes (RTDE outputs).
 inline constexpr int kProgramRegister = 24;  // output_int_register_24: the program's id

@@ -17,9 +17,16 @@ namespace {
 constexpr double kHistoryS = 30;                              // rig time
 constexpr double kStopConnectS = 0.3, kStopDashboardS = 0.5;  // host time
 constexpr double kDashboardS = 2;                             // host time
+constexpr size_t kSentProgramsKept = 64;                      // what the controller tells of a program comes at once
 constexpr std::chrono::milliseconds kStartGoesOut{
     5};  // what a stop waits for a start that is just being sent
 constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;  // the controller boots its arm in rig time
+
+// "def touch_7():\n ..." -> "touch_7"
+std::string ProgramName(const std::string& program) {
+  const size_t begin = program.find("def ") + 4;
+  return program.substr(begin, program.find('(', begin) - begin);
+}
 
 // For when the program ports are gone. A controller on which nothing runs answers that it failed to stop; whether
 // that is why, it says itself.
@@ -79,6 +86,8 @@ absl::Status UrArmOnTcp::Begin(uint32_t program_id, const std::string& program, 
     {
       std::lock_guard<std::mutex> lock(mutex_);
       start_ = Start{program_id, timing::HostNowS(), "", false};
+      sent_programs_.push_back(ProgramName(program));
+      if (sent_programs_.size() > kSentProgramsKept) sent_programs_.pop_front();
     }
     SendHeartbeat();
     // A stop that did not wait until the program had gone out must reach the controller behind it.
@@ -150,10 +159,6 @@ absl::Status UrArmOnTcp::StartFreedrive(uint32_t program_id, const StartGuard& g
   return Begin(program_id, FreedriveProgram(program_id, nominal_.model().e_series, options_.script), guard);
 }
 
-absl::Status UrArmOnTcp::BeginApproach(uint32_t program_id, const StartGuard& guard) {
-  return SendStart(guard, [&] { return Command(program_id, kCommandGo); });
-}
-
 absl::Status UrArmOnTcp::Command(uint32_t program_id, int command) {
   std::lock_guard<std::mutex> lock(inputs_mutex_);
   command_ = CommandWord(program_id, command);
@@ -192,6 +197,8 @@ absl::Status UrArmOnTcp::Stop() {
     const std::unique_lock<std::timed_mutex> lock(start_mutex_, kStartGoesOut);
     ++stop_count_;
   }
+  // The watchdog ends what does not heed the stop.
+  withhold_heartbeats_ = true;
   const absl::Status status = SendStop();
   {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -199,10 +206,13 @@ absl::Status UrArmOnTcp::Stop() {
   }
   changes_->Notify();
   if (status.ok()) return status;
-  withhold_heartbeats_ = true;
   return absl::UnavailableError(absl::StrCat(
       "the stop could not be sent to the controller at ", options_.address, " (", status.message(),
       "): its watchdog stops a running program soon; press the emergency stop if anything moves"));
+}
+
+absl::Status UrArmOnTcp::StopOtherwise() {
+  return StopOverDashboard(options_.address, options_.dashboard_port);
 }
 
 absl::Status UrArmOnTcp::DemandPower(const std::string& command, const std::string& expected,
@@ -251,17 +261,22 @@ absl::Status UrArmOnTcp::TakePowerSteps(const StartGuard& guard, bool* began) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     if (state.robot_mode == RobotMode::kRunning) return SafetyPermitsMotion(state.safety_mode);
     TOUCHSTONE_RETURN_IF_ERROR(SafetyPermitsMotion(state.safety_mode));
-    if (!powered && state.robot_mode < RobotMode::kIdle) {
+    // "power on" is valid from POWER_OFF alone; what boots or connects is waited for.
+    if (!powered && state.robot_mode == RobotMode::kPowerOff) {
       TOUCHSTONE_RETURN_IF_ERROR(DemandPower("power on", "Powering on", guard, began));
       powered = true;
     } else if (!released && state.robot_mode == RobotMode::kIdle) {
       TOUCHSTONE_RETURN_IF_ERROR(DemandPower("brake release", "Brake releasing", guard, began));
       released = true;
     }
+    if (state.robot_mode == RobotMode::kConfirmSafety || state.robot_mode == RobotMode::kBackdrive)
+      return absl::FailedPreconditionError(
+          absl::StrCat("the arm's mode is ", RobotModeName(state.robot_mode),
+                       ", and only a person at the teach pendant ends that; then power it on"));
     if (timing::HostNowS() > until_s)
-      return absl::UnavailableError(absl::StrCat("the arm was powered on but its mode is still ",
-                                                 RobotModeName(state.robot_mode),
-                                                 ": look at the teach pendant"));
+      return absl::UnavailableError(absl::StrCat("the arm's mode is still ", RobotModeName(state.robot_mode),
+                                                 *began ? " although it was powered on" : "",
+                                                 ", RUNNING is needed: look at the teach pendant"));
     changes_->WaitForChange(seen, 0.1);
   }
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -62,10 +63,20 @@ class UrArmOnTcp final : public UrArm {
   absl::Status MoveThrough(uint32_t program_id, const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints,
                            const StartGuard& guard) override;
-  absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard) override;
+  absl::Status BeginMotion(uint32_t program_id, const StartGuard& guard) override {
+    return SendStart(guard, [&] { return Command(program_id, kCommandMove); });
+  }
+  absl::Status BeginApproach(uint32_t program_id, const StartGuard& guard) override {
+    return SendStart(guard, [&] { return Command(program_id, kCommandGo); });
+  }
   absl::Status StartFreedrive(uint32_t program_id, const StartGuard& guard) override;
   absl::Status EndApproach(uint32_t program_id) override { return Command(program_id, kCommandRetract); }
   absl::Status Stop() override;
+  absl::Status StopOtherwise() override;
+  ForeignPrograms Foreign() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return foreign_;
+  }
   absl::Status PowerOn(const StartGuard& guard) override;
   void SendHeartbeat() override;
   absl::Status WriteHeartbeat();  // inputs_mutex_ is held
@@ -85,7 +96,10 @@ class UrArmOnTcp final : public UrArm {
     std::lock_guard<std::mutex> lock(mutex_);
     return kinematics_;
   }
-  bool ProgramPortsConnected() const { return programs_.Connected() && stops_.Connected(); }
+  // The primary one too: it tells when a program of somebody else begins.
+  bool ProgramPortsConnected() const {
+    return programs_.Connected() && stops_.Connected() && primary_.Connected();
+  }
 
  private:
   struct Start {
@@ -126,6 +140,8 @@ class UrArmOnTcp final : public UrArm {
   timing::ClockSync clock_;
   Start start_;
   std::optional<DhTable> kinematics_;
+  std::deque<std::string> sent_programs_;  // names of the last ones
+  ForeignPrograms foreign_;
 
   mutable std::atomic<bool> suspect_{false};  // a program did not begin
   std::mutex inputs_mutex_;                   // of the registers

@@ -3,6 +3,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
+
 #include "server/base/status.h"
 #include "server/gateway/arm/ur_arm_on_tcp.h"
 #include "server/gateway/arm/ur_modes.h"
@@ -61,6 +63,12 @@ void UrArmOnTcp::OnSample(const RtdeSample& sample, double host_s) {
 void UrArmOnTcp::OnPrimary(const PrimaryUpdate& update) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (update.kinematics.has_value()) kinematics_ = update.kinematics;
+  if (!update.started.empty() && update.started != kStopProgramName &&
+      std::find(sent_programs_.begin(), sent_programs_.end(), update.started) == sent_programs_.end()) {
+    ++foreign_.count;
+    foreign_.newest = update.started;
+    changes_->Notify();
+  }
   if (start_.program_id == 0 || !update.is_error) return;
   start_.complaint = update.message;
   start_.refused = start_.refused || update.is_exception;

@@ -3,6 +3,49 @@
 #include <absl/strings/str_cat.h>
 
 namespace touchstone::gateway::arm {
+namespace {
+
+struct SafetyRow {
+  SafetyMode mode;
+  const char* name;
+  SafetyKind kind;
+};
+// A touch in mode REDUCED is slower than commanded, and is refused for that.
+constexpr SafetyRow kSafetyRows[] = {
+    {SafetyMode::kNormal, "NORMAL", SafetyKind::kPermitsMotion},
+    {SafetyMode::kReduced, "REDUCED", SafetyKind::kPermitsMotion},
+    {SafetyMode::kProtectiveStop, "PROTECTIVE_STOP", SafetyKind::kProtectiveStop},
+    {SafetyMode::kRecovery, "RECOVERY", SafetyKind::kRecovery},
+    {SafetyMode::kSafeguardStop, "SAFEGUARD_STOP", SafetyKind::kSafeguard},
+    {SafetyMode::kSystemEmergencyStop, "SYSTEM_EMERGENCY_STOP", SafetyKind::kEmergencyStop},
+    {SafetyMode::kRobotEmergencyStop, "ROBOT_EMERGENCY_STOP", SafetyKind::kEmergencyStop},
+    {SafetyMode::kViolation, "VIOLATION", SafetyKind::kFault},
+    {SafetyMode::kFault, "FAULT", SafetyKind::kFault},
+    {SafetyMode::kValidateJointId, "VALIDATE_JOINT_ID", SafetyKind::kFault},
+    {SafetyMode::kUndefined, "UNDEFINED_SAFETY_MODE", SafetyKind::kFault},
+    {SafetyMode::kAutomaticModeSafeguardStop, "AUTOMATIC_MODE_SAFEGUARD_STOP", SafetyKind::kSafeguard},
+    {SafetyMode::kSystemThreePositionEnablingStop, "SYSTEM_THREE_POSITION_ENABLING_STOP",
+     SafetyKind::kSafeguard},
+    {SafetyMode::kPendantThreePositionEnablingStop, "TP_THREE_POSITION_ENABLING_STOP",
+     SafetyKind::kSafeguard},
+    {SafetyMode::kImmiEmergencyStop, "IMMI_EMERGENCY_STOP", SafetyKind::kEmergencyStop},
+    {SafetyMode::kImmiSafeguardStop, "IMMI_SAFEGUARD_STOP", SafetyKind::kSafeguard},
+    {SafetyMode::kProfisafeWaitingForParameters, "PROFISAFE_WAITING_FOR_PARAMETERS", SafetyKind::kFault},
+    {SafetyMode::kProfisafeAutomaticModeSafeguardStop, "PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP",
+     SafetyKind::kSafeguard},
+    {SafetyMode::kProfisafeSafeguardStop, "PROFISAFE_SAFEGUARD_STOP", SafetyKind::kSafeguard},
+    {SafetyMode::kProfisafeEmergencyStop, "PROFISAFE_EMERGENCY_STOP", SafetyKind::kEmergencyStop},
+    {SafetyMode::kSafetyApiSafeguardStop, "SAFETY_API_SAFEGUARD_STOP", SafetyKind::kSafeguard},
+    {SafetyMode::kIoPlaneStop, "IO_PLANE_STOP", SafetyKind::kFault},
+};
+
+const SafetyRow* Find(SafetyMode mode) {
+  for (const SafetyRow& row : kSafetyRows)
+    if (row.mode == mode) return &row;
+  return nullptr;
+}
+
+}  // namespace
 
 std::string RobotModeName(RobotMode mode) {
   static constexpr const char* kNames[] = {"NO_CONTROLLER", "DISCONNECTED",     "CONFIRM_SAFETY", "BOOTING",
@@ -15,18 +58,13 @@ std::string RobotModeName(RobotMode mode) {
 }
 
 std::string SafetyModeName(SafetyMode mode) {
-  static constexpr const char* kNames[] = {"NORMAL",
-                                           "REDUCED",
-                                           "PROTECTIVE_STOP",
-                                           "RECOVERY",
-                                           "SAFEGUARD_STOP",
-                                           "SYSTEM_EMERGENCY_STOP",
-                                           "ROBOT_EMERGENCY_STOP",
-                                           "VIOLATION",
-                                           "FAULT"};
-  const int number = static_cast<int>(mode);
-  if (mode < SafetyMode::kNormal || mode > SafetyMode::kFault) return absl::StrCat("UNKNOWN (", number, ")");
-  return kNames[number - static_cast<int>(SafetyMode::kNormal)];
+  const SafetyRow* row = Find(mode);
+  return row != nullptr ? row->name : absl::StrCat("UNKNOWN (", static_cast<int>(mode), ")");
+}
+
+SafetyKind KindOf(SafetyMode mode) {
+  const SafetyRow* row = Find(mode);
+  return row != nullptr ? row->kind : SafetyKind::kFault;
 }
 
 const char* PhaseName(MotionPhase phase) {
@@ -36,28 +74,25 @@ const char* PhaseName(MotionPhase phase) {
 }
 
 absl::Status SafetyPermitsMotion(SafetyMode safety_mode) {
-  const char* what_to_do = "look at the teach pendant";
-  switch (safety_mode) {
-    case SafetyMode::kNormal:
-    case SafetyMode::kReduced:  // slower, and a touch whose speed was scaled is refused
+  const char* what_to_do = "";
+  switch (KindOf(safety_mode)) {
+    case SafetyKind::kPermitsMotion:
       return absl::OkStatus();
-    case SafetyMode::kProtectiveStop:
+    case SafetyKind::kProtectiveStop:
       what_to_do =
           "find out why, clear the way, then unlock it at the teach pendant; this program never does";
       break;
-    case SafetyMode::kRecovery:
+    case SafetyKind::kRecovery:
       what_to_do = "the arm is outside its safety limits: move it back by hand at the teach pendant";
       break;
-    case SafetyMode::kSafeguardStop:
-      what_to_do = "somebody is inside the safeguard; close it";
+    case SafetyKind::kSafeguard:
+      what_to_do = "somebody is inside the safeguard, or the enabling device is not held; close it";
       break;
-    case SafetyMode::kSystemEmergencyStop:
-    case SafetyMode::kRobotEmergencyStop:
+    case SafetyKind::kEmergencyStop:
       what_to_do = "release the emergency stop, then power the arm on";
       break;
-    case SafetyMode::kUnspecified:
-    case SafetyMode::kViolation:
-    case SafetyMode::kFault:
+    case SafetyKind::kFault:
+      what_to_do = "look at the teach pendant";
       break;
   }
   return absl::FailedPreconditionError(absl::StrCat("the arm's safety mode is ", SafetyModeName(safety_mode),

@@ -27,6 +27,10 @@ std::string Phase(MotionPhase phase) {
                       ")\n");
 }
 
+// set_payload and set_payload_mass are deprecated from SW 5.10 in favour of set_target_payload, which with its defaults
+// does the same (script manual SW 10.6); they are what every controller here knows. Each of them zeroes an e-Series'
+// force sensor (the same page): whoever watches the force looks again before the program moves.
+//
 // UR's script manual (SW 5.x, set_payload): without a centre of gravity the tool centre point is taken for it, which
 // for fingers is much too far out; an arm that believes that stops protectively. set_payload_mass leaves the centre of
 // gravity as it is, which at the start of a program is the installation's.
@@ -38,6 +42,11 @@ std::string Payload(const ScriptOptions& options) {
                       Number(cog.z()), "])\n");
 }
 
+std::string WaitFor(uint32_t program_id, int command) {
+  return absl::StrCat("  while read_input_integer_register(", kCommandRegister,
+                      ") != ", CommandWord(program_id, command), ":\n    sync()\n  end\n");
+}
+
 // What every program begins with. The phase is written before the id, so that nobody sees this id with
 // an old phase.
 std::string Head(uint32_t program_id, const ScriptOptions& options) {
@@ -47,8 +56,8 @@ std::string Head(uint32_t program_id, const ScriptOptions& options) {
   if (!options.gravity_m_s2.isApprox(ScriptOptions().gravity_m_s2))
     absl::StrAppend(&text, "  set_gravity([", Number(options.gravity_m_s2.x()), ",",
                     Number(options.gravity_m_s2.y()), ",", Number(options.gravity_m_s2.z()), "])\n");
-  absl::StrAppend(&text, Phase(MotionPhase::kTransit), "  write_output_integer_register(", kProgramRegister,
-                  ", ", program_id, ")\n");
+  absl::StrAppend(&text, Phase(MotionPhase::kNone), "  write_output_integer_register(", kProgramRegister,
+                  ", ", program_id, ")\n", WaitFor(program_id, kCommandMove), Phase(MotionPhase::kTransit));
   return text;
 }
 
@@ -103,8 +112,7 @@ std::string TouchProgram(const ArmTouch& touch, const std::vector<double>& speed
 
   // Waits for the command; the approach runs in a thread, so that the end can be commanded at any
   // moment of it.
-  absl::StrAppend(&text, "  while ", command, " != ", CommandWord(touch.program_id, kCommandGo),
-                  ":\n    sync()\n  end\n");
+  absl::StrAppend(&text, WaitFor(touch.program_id, kCommandGo));
   absl::StrAppend(&text, "  global approaching = True\n  thread approach():\n    ",
                   MoveLine(touch.end, options.acceleration_m_s2, touch.speed_m_s),
                   "    approaching = False\n  end\n", Phase(MotionPhase::kApproach),
@@ -136,13 +144,12 @@ std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d
 std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options) {
   const std::string mode = e_series ? "freedrive_mode()\n" : "teach_mode()\n";
   return absl::StrCat("def guide_", program_id, "():\n", Head(program_id, options), "  ", mode,
-                      Phase(MotionPhase::kReady), "  while read_input_integer_register(", kCommandRegister,
-                      ") != ", CommandWord(program_id, kCommandRetract), ":\n    sync()\n  end\n  end_", mode,
+                      Phase(MotionPhase::kReady), WaitFor(program_id, kCommandRetract), "  end_", mode,
                       Phase(MotionPhase::kDone), "end\n");
 }
 
 std::string StopProgram() {
-  return "def stop_motion():\n  stopl(10)\nend\n";
+  return absl::StrCat("def ", kStopProgramName, "():\n  stopl(10)\nend\n");
 }
 
 }  // namespace touchstone::gateway::arm

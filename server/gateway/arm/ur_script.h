@@ -25,6 +25,9 @@ struct ScriptOptions {
   Eigen::Vector3d gravity_m_s2{0, 0, 9.82};  // as set_gravity takes it; this one (a table) is not sent
 };
 
+// Every program makes its settings, shows its id in phase kNone, and waits at rest for kCommandMove: what the controller
+// was sent moves nothing yet.
+
 // "p[0.3,0,0.1,3.14159,0,0]": position in m, rotation vector in rad.
 std::string PoseText(const Eigen::Isometry3d& pose);
 
@@ -39,6 +42,7 @@ std::string MoveProgram(uint32_t program_id, const std::vector<Eigen::Isometry3d
 // and SW 3). What ends the program ends it too: a stop, another program, the watchdog.
 std::string FreedriveProgram(uint32_t program_id, bool e_series, const ScriptOptions& options);
 std::string StopProgram();
+inline constexpr char kStopProgramName[] = "stop_motion";
 
 // What stands in the command register to command a program.
 int32_t CommandWord(uint32_t program_id, int command);

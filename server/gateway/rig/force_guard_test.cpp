@@ -3,47 +3,26 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "server/gateway/rig/scripted_arm.h"
+
 namespace touchstone::gateway {
 namespace {
 
 using ::testing::HasSubstr;
 
-// An arm that has only states.
-class StatesOnly : public arm::Arm {
+// An arm of which only the states matter.
+class StatesOnly : public ScriptedArm {
  public:
+  StatesOnly() { Forget(); }
   void Add(double controller_s, double speed_m_s, const Eigen::Vector3d& force_n) {
-    arm::ArmState state;
-    state.controller_time_s = controller_s;
-    state.tip_velocity_m_s.z() = -speed_m_s;
-    state.tip_force_n = force_n;
-    states_.push_back(state);
+    Change([&](arm::ArmState* state) {
+      state->controller_time_s = controller_s;
+      state->tip_velocity_m_s = {0, 0, -speed_m_s};
+      state->tip_force_n = force_n;
+    });
   }
-  absl::StatusOr<arm::ArmState> State() const override { return states_.back(); }
-  std::vector<arm::ArmState> History(double from_s, double to_s) const override {
-    std::vector<arm::ArmState> found;
-    for (const arm::ArmState& state : states_)
-      if (state.controller_time_s >= from_s && state.controller_time_s <= to_s) found.push_back(state);
-    return found;
-  }
-  absl::Status Ready() const override { return absl::OkStatus(); }
-  absl::Status StartTouch(const arm::ArmTouch&, const arm::StartGuard&) override { return absl::OkStatus(); }
-  absl::Status BeginApproach(uint32_t, const arm::StartGuard&) override { return absl::OkStatus(); }
-  absl::Status EndApproach(uint32_t) override { return absl::OkStatus(); }
-  absl::Status MoveThrough(uint32_t, const std::vector<Eigen::Isometry3d>&,
-                           const std::vector<std::array<double, 6>>&, const arm::StartGuard&) override {
-    return absl::OkStatus();
-  }
-  absl::Status Stop() override { return absl::OkStatus(); }
-  absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
-  void SendHeartbeat() override {}
-  timing::ClockEstimate ControllerClock() const override { return {}; }
-  double StateRateHz() const override { return 500; }
-  std::string Model() const override { return "ur3e"; }
-  std::string Address() const override { return ""; }
-  std::string Version() const override { return ""; }
-
- private:
-  std::vector<arm::ArmState> states_;
 };
 
 TEST(ForceGuard, SubtractsWhatIsFeltAtRest) {
@@ -100,6 +79,40 @@ TEST(ForceGuard, LetsGoOfWhatAMotionBeganAgainstButNeverPressesHarder) {
   ForceGuard harder(pressed, 25, "a motion");
   pressed.Add(1.002, 0.02, {0, 0, 51});
   EXPECT_FALSE(harder.Check(*pressed.State()).ok());
+}
+
+// Setting a payload zeroes an e-Series' sensor, also while something presses: the limit is neither raised nor lowered by
+// it (38 and 14 N of 25 once), in no direction.
+TEST(ForceGuard, ASensorThatWasZeroedBeforeTheMotionLeavesTheLimitWhereItWas) {
+  for (const double felt_n : {0.0, 8.0, -12.0}) {
+    for (const double sign : {1.0, -1.0}) {
+      StatesOnly arm;
+      arm.Add(1, 0, {0, 0, 0});  // after it was zeroed, with felt_n on the tip
+      ForceGuard guard(arm, 25, "a motion", {0, 0, felt_n});
+      arm.Add(1.002, 0.02, {0, 0, sign * 24.5});
+      EXPECT_TRUE(guard.Check(*arm.State()).ok()) << felt_n;
+      arm.Add(1.004, 0.02, {0, 0, sign * 25.5});
+      EXPECT_FALSE(guard.Check(*arm.State()).ok()) << felt_n;
+    }
+  }
+  // What it began against is let go of as before.
+  StatesOnly arm;
+  arm.Add(1, 0, {0, 0, 0});
+  ForceGuard out(arm, 25, "a motion", {0, 0, 44});
+  arm.Add(1.002, 0.02, {0, 0, -30});
+  EXPECT_TRUE(out.Check(*arm.State()).ok());
+  arm.Add(1.004, 0.02, {0, 0, -5});
+  EXPECT_FALSE(out.Check(*arm.State()).ok()) << "it presses again";
+}
+
+TEST(ForceGuard, AForceAtRestThatNoErrorOfASensorExplainsForbidsMotions) {
+  for (const double force_n : {12.0, 20.0, 30.0}) {
+    const absl::Status refused = CheckForceAtRest({0, 0, -force_n}, 25);
+    EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition) << force_n;
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("limits.payload_kg"));
+  }
+  EXPECT_TRUE(CheckForceAtRest({0, 0, 10}, 25).ok()) << "what a CB3's estimate may be wrong by";
+  EXPECT_TRUE(CheckForceAtRest({0, 0, 300}, std::numeric_limits<double>::infinity()).ok()) << "a hand's";
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ Rig::~Rig() {
   }
   watch_ends_.notify_all();
   if (safety_thread_.joinable()) safety_thread_.join();
-  if (motions_ > 0) parts_.arm->Stop().IgnoreError();
+  Close();
 }
 
 absl::StatusOr<uint32_t> Rig::NextProgramId() {
@@ -150,7 +150,7 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
   if (known.has_value()) return *std::move(known);
 
   // Everything that can forbid it, before anything is written or moved.
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   if (const effector::EffectorState effector = parts_.effector->State(); !effector.connected)
     return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
   const calibration::UpFace up_face = calibration::UpFaceFor(command.touch.approach);

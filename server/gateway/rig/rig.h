@@ -24,6 +24,7 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
+#include "server/gateway/rig/arm_watch.h"
 #include "server/gateway/rig/camera_pose.h"
 #include "server/gateway/rig/heartbeats.h"
 #include "server/gateway/rig/session_clock.h"
@@ -61,6 +62,11 @@ struct RigParts {
   std::unique_ptr<arm::MotionPlanner> planner;
   std::unique_ptr<session::Journal> journal;
   std::unique_ptr<audit::AuditLog> audit;
+};
+
+struct StopOutcome {
+  uint32_t motions = 0;     // that were under way
+  absl::Status standstill;  // OK: the arm was seen at rest after the stop, with no program that runs; else why not
 };
 
 class Rig : public source::RigDevice {
@@ -102,7 +108,7 @@ class Rig : public source::RigDevice {
   absl::Status Guide(const std::function<void(const arm::ArmState&)>& report,
                      const source::MotionGuard& caller);
   // Powers the arm on and releases its brakes; OK once it is ready to move. FAILED_PRECONDITION says what a
-  // person has to do first.
+  // person has to do first. Nothing else ever does: a motion on an arm without power is refused.
   absl::Status PowerOn(const source::MotionGuard& caller);
 
   // Every check of a touch without motion, from `from` (null: from where the arm is) and with the face up
@@ -115,13 +121,16 @@ class Rig : public source::RigDevice {
   absl::StatusOr<arm::PlannedTouch> CheckView(const source::ViewCommand& command, const arm::ArmState* from,
                                               const std::string& where) const;
 
-  // Stops everything, now; never waits for anything. Returns how many motions were under way. Every motion is
-  // refused (ABORTED) from now on, also by the next process on this journal, until Reset.
+  // Stops everything, now; what is sent waits for nothing. Then it looks until the arm stands still, tries another way if
+  // the arm does not heed the first, and gives up after 1.5 s. Every motion is refused (ABORTED) from now on, also by the
+  // next process on this journal, until Reset.
   //
-  // The same latch closes by itself: after a protective or emergency stop, a violation, a fault or recovery of the
-  // controller, after a safeguard stop that interrupted or refused a motion, and when a program ended that this
-  // gateway had neither stopped nor seen done (a watchdog, somebody at the teach pendant), also before its start.
-  uint32_t Stop(const std::string& reason, const std::string& who);
+  // The same latch closes by itself: for what ArmWatch finds, and when a motion came to an end that this gateway neither
+  // commanded nor saw done: its program was ended or paused, the link to the controller was lost, the gateway hung, was
+  // told to end, or ended before this process began.
+  StopOutcome Stop(const std::string& reason, const std::string& who);
+  // The process is told to end: no motion begins any more, and what is under way is stopped and latches.
+  void Close();
   // Releases a stop, moving nothing; without a stop it does nothing. FAILED_PRECONDITION while the controller's
   // own safety mode forbids motion, UNAVAILABLE while it cannot be asked: the stop holds then.
   absl::Status Reset(const std::string& reason, const std::string& who);
@@ -153,7 +162,8 @@ class Rig : public source::RigDevice {
   source::MotionGuard UntilStopped(const source::MotionGuard& caller) const;
   // Holds the rig for one motion; the guard's error if that fails while it waits for another one.
   absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const source::MotionGuard& guard);
-  // Powers the arm on and releases its brakes if they are not: only ever for somebody who may move it now.
+  // Why the arm may not move now for somebody whose guard this is; OK: it may.
+  absl::Status ReadyToMove(const source::MotionGuard& guard);
   absl::Status PowerUp(const source::MotionGuard& guard);
   absl::Status EnsureMounted(const std::string& object, calibration::UpFace up_face,
                              const source::MotionGuard& guard);
@@ -176,22 +186,43 @@ class Rig : public source::RigDevice {
                                                    const source::TouchCommand& command,
                                                    const source::MotionGuard& guard,
                                                    std::optional<session::JournalSeries>* series);
+  void Remember(const absl::Status& status);
+
+  // supervise.cpp
+  // A program of the gateway on the controller, from its sending on.
+  struct Program {
+    uint32_t id = 0;
+    source::MotionGuard guard;
+    double max_force_n = 0;   // infinite: the force is a hand's
+    bool let_go = false;      // it was told to move
+    double hung_s = 0;        // the longest hang of its supervisor, host time; 0: none
+    double hung_at_s = 0;     // when that ended
+    Eigen::Vector3d zeroed_n = Eigen::Vector3d::Zero();  // ForceGuard
+  };
   // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
   // motion may not go on (the controller's safety mode, its guard).
   absl::Status MayGoOn(const source::MotionGuard& guard);
-  // Watches until `done` says so; stops the arm and returns why on anything else. `limit_s`: host time.
-  // `max_force_n`: none: that of the limits.
-  absl::Status Supervise(uint32_t program_id, double limit_s, const char* what,
-                         const source::MotionGuard& guard,
-                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done,
-                         std::optional<double> max_force_n = std::nullopt);
-  void Remember(const absl::Status& status);
+  // Sends a program, waits until it has made its settings, looks at the force at rest, and lets it move.
+  absl::Status Launch(Program* program, const char* what,
+                      const std::function<absl::Status(const arm::StartGuard&)>& send);
+  // Watches until `done` says so; gives up on anything else. `limit_s`: host time.
+  absl::Status Supervise(Program* program, double limit_s, const char* what,
+                         const std::function<absl::StatusOr<bool>(const arm::ArmState&)>& done);
+  // Stops the arm, latches unless this gateway itself ended the motion, and returns `why` and what was wrong with the stop.
+  absl::Status GiveUp(Program* program, const char* what, const absl::Status& why);
+  // After a stop that was sent at `from_s`, the controller's time: waits until the arm is at rest, and sends a stop by
+  // another way if it does not heed the first. UNAVAILABLE: it was not seen at rest within 1.5 s, or cannot be asked.
+  absl::Status ConfirmStandstill(double from_s);
+  double ControllerNowS() const;  // of the newest state; 0: there is none
 
   // rig_safety.cpp
   // Closes the latch of Stop; `what` is "by WHOM (WHY)", and is added to what closed it before.
   void Latch(const std::string& what);
-  // Latches what the controller's states since the last look tell; `refused`: a motion is being asked for now.
-  void LookAtSafety(bool refused = false);
+  // Latches what the controller's states since the last look tell; `asked`: a motion is being asked for now.
+  void LookAtSafety(bool asked = false);
+  // A protective or safeguard stop pauses a program on a UR, and the pendant could go on with it: one that was given up
+  // is ended as soon as the controller lets it.
+  void EndPausedProgram();
   void WatchSafety();  // the thread
   // Before anything else at the start: latches if a motion was under way when the process before this one ended.
   absl::Status LatchInterruption();
@@ -199,7 +230,7 @@ class Rig : public source::RigDevice {
 
   // The journal's record of who stopped the rig and why; "" once it was reset.
   static constexpr char kStopKey[] = "stop";
-  // Of the last motion that is no touch: its program's id and what it was; "" once it has failed.
+  // Of the last motion that is no touch: its program's id (0: power) and what it was; "" once it has failed.
   static constexpr char kMotionKey[] = "motion_under_way";
 
   double NowS() const { return options_.clock->NowS(); }  // host time
@@ -221,9 +252,13 @@ class Rig : public source::RigDevice {
   std::string last_session_;  // whose fingers and spacing are this rig's
   uint32_t next_program_id_ = 1, reserved_program_id_ = 0;
 
-  std::mutex safety_mutex_;    // of what LookAtSafety knows
-  double safety_seen_s_ = -1;  // controller time of the last state that it has seen; below 0: none yet
-  std::optional<arm::SafetyMode> latched_safety_;  // that it latched last, while it lasts
+  std::mutex safety_mutex_;  // of what LookAtSafety knows
+  ArmWatch watch_;
+  std::atomic<bool> powering_{false};         // PowerUp is under way
+  std::atomic<bool> closing_{false};          // Close was called
+  std::atomic<uint32_t> given_up_{0};         // the program that was given up last; 0: none
+  std::atomic<bool> left_pressed_{false};     // the last motion did not come to its end: the tool may press
+  double paused_stop_s_ = -1e9;               // host time at which EndPausedProgram sent a stop
   std::mutex watch_mutex_;
   std::condition_variable watch_ends_;
   bool ending_ = false;

@@ -18,28 +18,30 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
                         const source::MotionGuard& caller) {
   const source::MotionGuard guard = UntilStopped(caller);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
   TOUCHSTONE_RETURN_IF_ERROR(
       journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")));
   audit().Write("freedrive", {{"program", std::to_string(program_id)}}).IgnoreError();
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
-  absl::Status status = parts_.arm->StartFreedrive(program_id, guard);
+  // The hand may press as hard as it likes.
+  Program program{program_id, guard, std::numeric_limits<double>::infinity()};
+  absl::Status status = Launch(&program, "freedrive", [&](const arm::StartGuard& start) {
+    return parts_.arm->StartFreedrive(program_id, start);
+  });
   double reported_s = 0;
-  // Whatever ends the watch stops the program, and with it freedrive. The hand may press as hard as it likes.
+  // Whatever ends the watch stops the program, and with it freedrive.
   if (status.ok())
-    status = Supervise(
-        program_id, kLongestGuideS, "freedrive", guard,
-        [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
-          const double now_s = NowS();
-          if (state.phase == arm::MotionPhase::kReady && now_s - reported_s >= kGuideReportS) {
-            reported_s = now_s;
-            report(state);
-          }
-          return state.phase == arm::MotionPhase::kDone;
-        },
-        std::numeric_limits<double>::infinity());
+    status = Supervise(&program, kLongestGuideS, "freedrive",
+                       [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
+                         const double now_s = NowS();
+                         if (state.phase == arm::MotionPhase::kReady && now_s - reported_s >= kGuideReportS) {
+                           reported_s = now_s;
+                           report(state);
+                         }
+                         return state.phase == arm::MotionPhase::kDone;
+                       });
   --motions_;
   TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
   audit().Write("freedrive_ended", {{"why", std::string(status.message())}}).IgnoreError();

@@ -9,8 +9,8 @@
 
 #include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
-#include "server/gateway/arm/kinematics.h"
 #include "server/gateway/rig/rig.h"
+#include "server/gateway/rig/scripted_arm.h"
 
 namespace touchstone::gateway {
 namespace {
@@ -21,86 +21,6 @@ using arm::RuntimeState;
 using arm::SafetyMode;
 using testing::AllOf;
 using testing::HasSubstr;
-
-class FakeArm final : public arm::Arm {
- public:
-  explicit FakeArm(timing::ChangeNotifier* changes) : changes_(changes) {
-    const arm::MotionLimits limits;
-    state_.joints_rad = limits.home_rad;
-    state_.base_from_tip = arm::UrKinematics::ForModel("ur3e").value().Forward(limits.home_rad);
-    state_.robot_mode = arm::RobotMode::kRunning;
-    state_.safety_mode = SafetyMode::kNormal;
-    state_.runtime_state = RuntimeState::kStopped;
-    state_.speed_scaling = state_.target_speed_fraction = 1;
-    Change([](ArmState*) {});
-  }
-  // The next state that the controller sends.
-  void Change(const std::function<void(ArmState*)>& change) {
-    {
-      std::lock_guard<std::mutex> lock(mutex_);
-      change(&state_);
-      state_.controller_time_s += 0.002;
-      state_.host_time_s = timing::HostNowS();
-      history_.push_back(state_);
-    }
-    changes_->Notify();
-  }
-  void SetSafety(SafetyMode mode) {
-    Change([mode](ArmState* state) { state->safety_mode = mode; });
-  }
-  void SetProgram(uint32_t id, MotionPhase phase, RuntimeState runtime) {
-    Change([=](ArmState* state) {
-      state->program_id = id, state->phase = phase, state->runtime_state = runtime;
-    });
-  }
-
-  absl::StatusOr<ArmState> State() const override {
-    std::lock_guard<std::mutex> lock(mutex_);
-    return state_;
-  }
-  std::vector<ArmState> History(double from_s, double to_s) const override {
-    std::lock_guard<std::mutex> lock(mutex_);
-    std::vector<ArmState> states;
-    for (const ArmState& state : history_)
-      if (state.controller_time_s >= from_s && state.controller_time_s <= to_s) states.push_back(state);
-    return states;
-  }
-  absl::Status Ready() const override { return absl::OkStatus(); }
-  absl::Status StartTouch(const arm::ArmTouch&, const arm::StartGuard&) override {
-    return absl::UnimplementedError("no touches here");
-  }
-  absl::Status BeginApproach(uint32_t, const arm::StartGuard&) override { return absl::OkStatus(); }
-  absl::Status EndApproach(uint32_t) override { return absl::OkStatus(); }
-  absl::Status MoveThrough(uint32_t id, const std::vector<Eigen::Isometry3d>&,
-                           const std::vector<std::array<double, 6>>&, const arm::StartGuard& guard) override {
-    if (before_send) before_send();
-    if (const absl::Status allowed = guard(); !allowed.ok()) return allowed;
-    SetProgram(id, MotionPhase::kTransit, RuntimeState::kPlaying);
-    ++programs;  // last: a test that sees it changes the state
-    return absl::OkStatus();
-  }
-  absl::Status Stop() override {
-    ++stops;
-    Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
-    return absl::OkStatus();
-  }
-  absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
-  void SendHeartbeat() override { ++heartbeats; }
-  timing::ClockEstimate ControllerClock() const override { return {}; }
-  double StateRateHz() const override { return 500; }
-  std::string Model() const override { return "ur3e"; }
-  std::string Address() const override { return "a test"; }
-  std::string Version() const override { return "0"; }
-
-  std::function<void()> before_send;
-  std::atomic<int> programs{0}, stops{0}, heartbeats{0};
-
- private:
-  timing::ChangeNotifier* const changes_;
-  mutable std::mutex mutex_;
-  ArmState state_;
-  std::vector<ArmState> history_;
-};
 
 class FakeEffector final : public effector::Effector {
  public:
@@ -124,7 +44,7 @@ class RigLatch : public testing::Test {
 
   void MakeParts() {
     parts_.changes = std::make_unique<timing::ChangeNotifier>();
-    auto arm = std::make_unique<FakeArm>(parts_.changes.get());
+    auto arm = std::make_unique<ScriptedArm>(parts_.changes.get());
     arm_ = arm.get();
     parts_.arm = std::move(arm);
     parts_.effector = std::make_unique<FakeEffector>();
@@ -200,7 +120,7 @@ class RigLatch : public testing::Test {
   ManualClock clock_;
   std::atomic<int> guards_{0};
   RigParts parts_;
-  FakeArm* arm_ = nullptr;
+  ScriptedArm* arm_ = nullptr;
   std::unique_ptr<Rig> rig_;
 };
 
@@ -258,7 +178,7 @@ TEST_F(RigLatch, ASafeguardLatchesOnlyIfItInterruptedOrRefusedAMotion) {
   ASSERT_TRUE(rig_->Reset("nobody is inside", "ana").ok());
 
   auto homing = HomeLater();
-  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
   arm_->SetSafety(SafetyMode::kSafeguardStop);
   EXPECT_EQ(homing.get().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(rig_->StopReason(), HasSubstr("SAFEGUARD_STOP during program"));
@@ -267,7 +187,7 @@ TEST_F(RigLatch, ASafeguardLatchesOnlyIfItInterruptedOrRefusedAMotion) {
 TEST_F(RigLatch, AProgramThatSomethingElseEndedLatches) {
   Start();
   auto homing = HomeLater();
-  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
   // As after a trip of the watchdog, or "stop" at the teach pendant.
   arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kStopped; });
   PassUnderSupervision(0.85, [] { return false; });
@@ -310,7 +230,7 @@ TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
     hang = false;
     rig_->Stop("the test is over", "ana");
   };
-  ASSERT_TRUE(WaitFor([&] { return arm_->programs == 1; }));
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
   // They come while it moves, for longer than one permit.
   for (double passed_s = 0; passed_s < 2 * Heartbeats::kPermitS; passed_s += Heartbeats::kPeriodS) {
     AwaitThreads();
@@ -337,9 +257,9 @@ TEST_F(RigLatch, ASupervisorThatHangsLosesItsHeartbeats) {
 TEST_F(RigLatch, AMotionThatFailedAfterAHangLatchesAndOneThatFailedInTimeDoesNot) {
   Start();
   for (const double hang_s : {0.0, 0.3, 0.6}) {
-    const int programs = arm_->programs;
+    const int motions = arm_->motions;
     const absl::Status lost = rig_->Home([&]() -> absl::Status {
-      if (arm_->programs == programs) return absl::OkStatus();
+      if (arm_->motions == motions) return absl::OkStatus();
       clock_.Advance(hang_s);
       return absl::AbortedError("the lease was lost");
     });
@@ -349,6 +269,115 @@ TEST_F(RigLatch, AMotionThatFailedAfterAHangLatchesAndOneThatFailedInTimeDoesNot
     else
       EXPECT_THAT(rig_->StopReason(), HasSubstr("it hung for 0.6 s during a motion"));
   }
+}
+
+// --- Whatever ended a motion that this gateway did not end itself
+
+TEST_F(RigLatch, ALinkThatWasLostDuringAMotionLatchesAndBeforeItDoesNot) {
+  Start();
+  arm_->before_send = [&] { arm_->SetLink(absl::UnavailableError("the link is down")); };
+  EXPECT_FALSE(Home().ok());
+  EXPECT_EQ(rig_->StopReason(), "") << "what was not let go waited at rest";
+  EXPECT_EQ(arm_->motions, 0);
+  arm_->before_send = nullptr;
+  arm_->SetLink(absl::OkStatus());
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
+  arm_->SetLink(absl::UnavailableError("the link is down"));
+  ASSERT_TRUE(WaitFor([&] { return !rig_->StopReason().empty(); }));
+  arm_->SetLink(absl::OkStatus());
+  EXPECT_EQ(homing.get().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(rig_->StopReason(), AllOf(HasSubstr("the loss of the arm's controller"), HasSubstr("during a motion")));
+  EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
+}
+
+TEST_F(RigLatch, APausedProgramLatchesHoweverSoonItGoesOnAndIsEndedIfItStaysPaused) {
+  Start();
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
+  arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kPausing; });
+  arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kPlaying; });
+  EXPECT_EQ(homing.get().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("was paused during a motion"));
+
+  // As a safety function leaves it: somebody could go on with it at the pendant.
+  arm_->Change([](ArmState* state) { state->runtime_state = RuntimeState::kPaused; });
+  const int stops = arm_->stops;
+  for (int look = 0; look < 4; ++look) LetTheWatchLook();  // the heartbeats' thread still takes turns with it
+  EXPECT_EQ(arm_->stops, stops + 1) << "one stop ends the program";
+}
+
+TEST_F(RigLatch, AGatewayThatIsToldToEndLatchesIfSomethingMoved) {
+  Start();
+  rig_->Close();
+  EXPECT_EQ(rig_->StopReason(), "");
+  EXPECT_EQ(Home().code(), absl::StatusCode::kUnavailable);
+  End();
+  Start();
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
+  rig_->Close();
+  EXPECT_FALSE(homing.get().ok());
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("the gateway was told to end"));
+  End();
+  Start();
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("the gateway was told to end"));
+}
+
+TEST_F(RigLatch, AProgramOfSomebodyElseEndsAMotionAndLatches) {
+  Start();
+  auto homing = HomeLater();
+  ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
+  arm_->foreign = {1, "swing"};
+  PassUnderSupervision(60,
+                       [&] { return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
+  EXPECT_EQ(homing.get().code(), absl::StatusCode::kAborted);
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("the program 'swing'"));
+  EXPECT_GE(arm_->stops, 1);
+}
+
+TEST_F(RigLatch, APowerUpThatWasUnderWayLatchesInTheNextProcess) {
+  MakeParts();
+  ASSERT_TRUE(parts_.journal->SetMetadata("motion_under_way", "0 powering the arm on").ok());
+  Start();
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("powering the arm on was under way when the gateway ended"));
+}
+
+// --- Stops
+
+TEST_F(RigLatch, AStopThatIsNotHeededIsSentAnotherWayAndElseNotConfirmed) {
+  for (const bool heeds_other : {true, false}) {
+    Start();
+    arm_->SetProgram(9, MotionPhase::kTransit, RuntimeState::kPlaying);
+    arm_->heeds_stops = false, arm_->heeds_other_stops = heeds_other;
+    auto stopping = std::async(std::launch::async, [&] { return rig_->Stop("a test", "ana"); });
+    const auto ended = [&] { return stopping.wait_for(std::chrono::seconds(0)) == std::future_status::ready; };
+    while (!ended()) {
+      clock_.Advance(0.05);
+      arm_->Change([](ArmState* state) { state->joints_rad[0] += 1e-4; });
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    const StopOutcome outcome = stopping.get();
+    EXPECT_EQ(outcome.standstill.ok(), heeds_other) << outcome.standstill;
+    EXPECT_EQ(arm_->other_stops, 1);
+    if (!heeds_other) {
+      EXPECT_THAT(std::string(outcome.standstill.message()),
+                  AllOf(HasSubstr("NOT CONFIRMED"), HasSubstr("a program runs on"), HasSubstr("emergency stop")));
+    }
+    EXPECT_THAT(rig_->StopReason(), HasSubstr("by ana (a test)"));
+    End();
+  }
+}
+
+TEST_F(RigLatch, AnArmThatIsPressedAtRestDoesNotBeginToMove) {
+  Start();
+  arm_->Pass(0.3);
+  arm_->Change([](ArmState* state) { state->tip_force_n = {0, 0, -14}; });
+  arm_->Pass(0.3);
+  const absl::Status refused = Home();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("feels 14.0 N"));
+  EXPECT_EQ(arm_->programs, 0);
 }
 
 // --- What a process before this one left

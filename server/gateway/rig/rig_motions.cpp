@@ -36,21 +36,57 @@ session::JournalView ViewOf(const source::ViewCommand& command, const Eigen::Iso
 
 }  // namespace
 
+absl::Status Rig::ReadyToMove(const source::MotionGuard& guard) {
+  constexpr double kProgramEndsS = 1;  // host time; the one before is at its last cycles
+  LookAtSafety(/*asked=*/true);
+  TOUCHSTONE_RETURN_IF_ERROR(guard());
+  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->Ready());
+  for (const double until_s = NowS() + kProgramEndsS;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
+    if (state.runtime_state == arm::RuntimeState::kStopped) return absl::OkStatus();
+    TOUCHSTONE_RETURN_IF_ERROR(guard());
+    if (NowS() >= until_s)
+      return absl::FailedPreconditionError(
+          absl::StrCat("a program that is not this gateway's ",
+                       state.runtime_state == arm::RuntimeState::kPaused ? "is paused" : "runs",
+                       " on the controller: end it at the teach pendant first"));
+    parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
+  }
+}
+
 absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
-  constexpr double kPatienceS = 10;
-  LookAtSafety(/*refused=*/true);
+  constexpr double kPatienceS = 10, kPowerOffShowsS = 2;  // host time
+  LookAtSafety(/*asked=*/true);
   TOUCHSTONE_RETURN_IF_ERROR(guard());
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
   if (state.robot_mode == arm::RobotMode::kRunning || !arm::SafetyPermitsMotion(state.safety_mode).ok())
     return parts_.arm->Ready();
   audit().Write("power_on", {{"robot_mode", arm::RobotModeName(state.robot_mode)}}).IgnoreError();
-  TOUCHSTONE_RETURN_IF_ERROR(parts_.arm->PowerOn(guard));
+  // An arm that is told to release its brakes does so by itself, whatever becomes of this process.
+  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, "0 powering the arm on"));
+  powering_ = true;
+  absl::Status status = parts_.arm->PowerOn(guard);
   // The states report it a little later than the dashboard.
-  for (const double until_s = NowS() + kPatienceS; !parts_.arm->Ready().ok() && NowS() < until_s;) {
-    TOUCHSTONE_RETURN_IF_ERROR(guard());
+  for (const double until_s = NowS() + kPatienceS; status.ok() && !parts_.arm->Ready().ok() && NowS() < until_s;) {
+    status = guard();
     parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
-  return parts_.arm->Ready();
+  if (status.ok()) status = parts_.arm->Ready();
+  if (!status.ok()) {
+    if (!parts_.arm->State().ok())
+      Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(), ")"));
+    // What was taken back is not taken for somebody else's doing.
+    const auto off = [this] {
+      const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
+      return !now.ok() || now->robot_mode != arm::RobotMode::kRunning;
+    };
+    for (const double until_s = NowS() + kPowerOffShowsS; !off() && NowS() < until_s;)
+      parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
+  }
+  LookAtSafety();
+  powering_ = false;
+  unwritten_.SetFacts({{kMotionKey, ""}}, true).IgnoreError();
+  return status;
 }
 
 absl::Status Rig::PowerOn(const source::MotionGuard& caller) {
@@ -71,7 +107,7 @@ absl::StatusOr<source::Photograph> Rig::Photograph(const source::ViewCommand& co
     return absl::FailedPreconditionError(
         "the calibration file has no flange_from_camera: where the camera sits");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   const calibration::UpFace up_face = calibration::UpFaceFor(command.object_from_camera.rotation().col(2));
   TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::Isometry3d base_from_object,
@@ -154,9 +190,12 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
       journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
-  absl::Status status = parts_.arm->MoveThrough(program_id, poses, joints, guard);
+  Program program{program_id, guard, parts_.planner->limits().max_force_n};
+  absl::Status status = Launch(&program, "a motion", [&](const arm::StartGuard& start) {
+    return parts_.arm->MoveThrough(program_id, poses, joints, start);
+  });
   if (status.ok())
-    status = Supervise(program_id, 2 * duration_s / options_.time_scale + 15, "a motion", guard,
+    status = Supervise(&program, 2 * duration_s / options_.time_scale + 15, "a motion",
                        [](const arm::ArmState& state) -> absl::StatusOr<bool> {
                          return state.phase == arm::MotionPhase::kDone;
                        });
@@ -176,7 +215,7 @@ absl::Status Rig::Home(const source::MotionGuard& caller) {
 }
 
 absl::Status Rig::MoveHome(const source::MotionGuard& guard) {
-  TOUCHSTONE_RETURN_IF_ERROR(PowerUp(guard));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
   // How high the tool must be lifted depends on what lies there.
   std::optional<double> top_m;

@@ -1,10 +1,5 @@
-// What closes the latch of Stop without anybody's call: the controller's safety modes, and motions that were under way
-// when a gateway ended.
-//
-// Protective and emergency stops, violations, faults and recovery latch whenever they are seen. A safeguard stop (a
-// door, a light curtain) latches only if it interrupted a motion or one was asked for while it stood: UR's user manuals
-// list it as used up to every cycle and with an automatic or manual reset, unlike the emergency stop, so a person may
-// change the object between motions without a reset, but no program that retries moves the arm when the door closes.
+// What closes the latch of Stop without anybody's call: what the arm does by itself (arm_watch.h), and motions that were
+// under way when a gateway ended.
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -12,9 +7,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <cmath>
 #include <ctime>
-#include <limits>
 
 #include "server/base/status.h"
 #include "server/base/units.h"
@@ -35,23 +28,6 @@ std::string UtcNow() {
   char text[32] = "";
   if (::gmtime_r(&now, &parts) != nullptr) std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
   return text;
-}
-
-// `interrupts`: it stopped a motion, or one was refused because of it.
-bool Latches(arm::SafetyMode mode, bool interrupts) {
-  switch (mode) {
-    case arm::SafetyMode::kProtectiveStop:
-    case arm::SafetyMode::kRecovery:
-    case arm::SafetyMode::kSystemEmergencyStop:
-    case arm::SafetyMode::kRobotEmergencyStop:
-    case arm::SafetyMode::kViolation:
-    case arm::SafetyMode::kFault:
-      return true;
-    case arm::SafetyMode::kSafeguardStop:
-      return interrupts;
-    default:
-      return false;
-  }
 }
 
 std::string PlaceOf(const arm::ArmState& state) {
@@ -83,41 +59,25 @@ void Rig::Latch(const std::string& what) {
   spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);
 }
 
-void Rig::LookAtSafety(bool refused) {
+void Rig::LookAtSafety(bool asked) {
   std::lock_guard<std::mutex> lock(safety_mutex_);
-  if (const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
-      now.ok() && now->controller_time_s < safety_seen_s_)
-    safety_seen_s_ = 0;  // the controller was started anew
-  const bool first = safety_seen_s_ < 0;
-  for (const arm::ArmState& state :
-       parts_.arm->History(std::nextafter(safety_seen_s_, std::numeric_limits<double>::infinity()),
-                           std::numeric_limits<double>::infinity())) {
-    const bool at_start = first && safety_seen_s_ < 0;
-    safety_seen_s_ = state.controller_time_s;
-    if (arm::SafetyPermitsMotion(state.safety_mode).ok()) {
-      latched_safety_.reset();
-      continue;
-    }
-    const bool moving = motions_ > 0;
-    if (latched_safety_ == state.safety_mode || !Latches(state.safety_mode, moving)) continue;
-    latched_safety_ = state.safety_mode;
-    const std::string when = at_start ? "found when the arm was reached"
-                             : moving ? absl::StrCat("during program ", state.program_id, ", phase '",
-                                                     arm::PhaseName(state.phase), "'")
-                                      : "between motions";
-    const std::string what = absl::StrCat(arm::SafetyModeName(state.safety_mode), " ", when);
+  for (const std::string& what : watch_.Look(*parts_.arm, {motions_ > 0, powering_, asked})) {
     Latch(absl::StrCat("by the arm's controller (", what, ")"));
     audit().Write("latched", {{"what", what}}).IgnoreError();
   }
-  // A safeguard that stood open unnoticed, until somebody wanted to move.
+  EndPausedProgram();
+}
+
+void Rig::EndPausedProgram() {
+  constexpr double kAgainS = 1;  // host time
   const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
-  if (!refused || !now.ok() || latched_safety_ == now->safety_mode || !Latches(now->safety_mode, true))
+  if (motions_ > 0 || given_up_ == 0 || !now.ok() || now->program_id != given_up_ ||
+      now->runtime_state != arm::RuntimeState::kPaused || NowS() - paused_stop_s_ < kAgainS)
     return;
-  latched_safety_ = now->safety_mode;
-  const std::string what =
-      absl::StrCat(arm::SafetyModeName(now->safety_mode), " when a motion was asked for");
-  Latch(absl::StrCat("by the arm's controller (", what, ")"));
-  audit().Write("latched", {{"what", what}}).IgnoreError();
+  paused_stop_s_ = NowS();
+  const absl::Status ended = parts_.arm->Stop();
+  spdlog::warn("program {}, which was given up, is paused on the controller and is ended: {}", now->program_id,
+               ended.ok() ? "sent" : std::string(ended.message()));
 }
 
 void Rig::WatchSafety() {
@@ -143,7 +103,13 @@ absl::Status Rig::LatchInterruption() {
   if (!absl::SimpleAtoi(parts.first, &program_id))
     return absl::DataLossError(absl::StrCat("the journal's ", kMotionKey, " is '", motion,
                                             "': a program's id and what it did were expected"));
-  TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(program_id, parts.second));
+  // Releasing brakes has no program that could say how far it came.
+  if (program_id == 0) {
+    Latch(absl::StrCat("by the start of the gateway (", parts.second, " was under way when the gateway ended)"));
+    audit().Write("latched", {{"what", parts.second}}).IgnoreError();
+  } else {
+    TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(program_id, parts.second));
+  }
   // The latch is on the disk: it need not be found again.
   return journal().SetMetadata(kMotionKey, "");
 }
@@ -167,6 +133,7 @@ absl::Status Rig::LatchUnlessItEnded(uint32_t program_id, const std::string& wha
     found = absl::StrCat("the arm cannot be asked: ", state.status().message());
   } else {
     const bool ran = !rests(*state);
+    given_up_ = program_id;
     if (ran) {
       parts_.arm->Stop().IgnoreError();
       state = state_once(kProgramEndsS, rests);
@@ -179,7 +146,8 @@ absl::Status Rig::LatchUnlessItEnded(uint32_t program_id, const std::string& wha
           (state->program_id != program_id || state->phase == arm::MotionPhase::kDone))
         return absl::OkStatus();
       found =
-          absl::StrCat(!rests(*state)                    ? "its program runs on although it was stopped"
+          absl::StrCat(state->runtime_state == arm::RuntimeState::kPaused ? "its program is paused"
+                       : !rests(*state)                  ? "its program runs on although it was stopped"
                        : ran                             ? "its program ran on and was stopped"
                        : state->program_id != program_id ? "the controller knows nothing of its program"
                                                          : "its program had been ended (by the watchdog "

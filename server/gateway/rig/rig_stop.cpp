@@ -12,6 +12,7 @@ namespace touchstone::gateway {
 
 source::MotionGuard Rig::UntilStopped(const source::MotionGuard& caller) const {
   return [this, caller, stops = stops_.load()]() -> absl::Status {
+    if (closing_) return absl::UnavailableError("the gateway is being shut down");
     if (stops_ == stops && !stopped_) return caller();
     const std::string reason = StopReason();
     // What has to be done first at the teach pendant comes first.
@@ -34,21 +35,32 @@ absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const source::Mo
   }
 }
 
-uint32_t Rig::Stop(const std::string& reason, const std::string& who) {
-  const uint32_t motions = motions_;
+StopOutcome Rig::Stop(const std::string& reason, const std::string& who) {
+  StopOutcome outcome;
+  outcome.motions = motions_;
   stopped_ = true;
   ++stops_;
+  const double stopped_s = ControllerNowS();
   const absl::Status status = parts_.arm->Stop();
   parts_.changes->Notify();
   if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
   Latch(absl::StrCat("by ", who, " (", reason, ")"));
+  outcome.standstill = ConfirmStandstill(stopped_s);
+  if (!outcome.standstill.ok()) spdlog::error("stop: {}", std::string(outcome.standstill.message()));
   audit()
-      .Write("stop", {{"who", who},
-                      {"reason", reason},
-                      {"motions", absl::StrCat(motions)},
-                      {"sent", status.ok() ? "yes" : std::string(status.message())}})
+      .Write("stop",
+             {{"who", who},
+              {"reason", reason},
+              {"motions", absl::StrCat(outcome.motions)},
+              {"sent", status.ok() ? "yes" : std::string(status.message())},
+              {"standstill", outcome.standstill.ok() ? "yes" : std::string(outcome.standstill.message())}})
       .IgnoreError();
-  return motions;
+  return outcome;
+}
+
+void Rig::Close() {
+  closing_ = true;
+  if (motions_ > 0) Stop("the gateway was told to end while something moved", "the end of the gateway");
 }
 
 absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
@@ -79,20 +91,18 @@ std::string Rig::StopReason() const {
 source::SourceState Rig::State() const {
   const absl::StatusOr<arm::ArmState> arm = parts_.arm->State();
   if (!arm.ok()) return source::SourceState::kDisconnected;
-  switch (arm->safety_mode) {
-    case arm::SafetyMode::kNormal:
-    case arm::SafetyMode::kReduced:
+  switch (arm::KindOf(arm->safety_mode)) {
+    case arm::SafetyKind::kPermitsMotion:
       break;
-    case arm::SafetyMode::kProtectiveStop:
+    case arm::SafetyKind::kProtectiveStop:
       return source::SourceState::kProtectiveStop;
-    case arm::SafetyMode::kRecovery:
+    case arm::SafetyKind::kRecovery:
       return source::SourceState::kRecovery;
-    case arm::SafetyMode::kSafeguardStop:
+    case arm::SafetyKind::kSafeguard:
       return source::SourceState::kSafeguardStop;
-    case arm::SafetyMode::kSystemEmergencyStop:
-    case arm::SafetyMode::kRobotEmergencyStop:
+    case arm::SafetyKind::kEmergencyStop:
       return source::SourceState::kEmergencyStop;
-    default:
+    case arm::SafetyKind::kFault:
       return source::SourceState::kFault;
   }
   if (stopped_) return source::SourceState::kStopped;

@@ -36,6 +36,9 @@ class StampedArm : public gateway::arm::Arm {
     stamps_->disk_before_s = stamps_->disk_s;
     return status;
   }
+  absl::Status BeginMotion(uint32_t program_id, const gateway::arm::StartGuard& guard) override {
+    return arm_->BeginMotion(program_id, guard);
+  }
   absl::Status BeginApproach(uint32_t program_id, const gateway::arm::StartGuard& guard) override {
     const absl::Status status = arm_->BeginApproach(program_id, guard);
     stamps_->go_sent_s = gateway::timing::HostNowS();
@@ -52,6 +55,8 @@ class StampedArm : public gateway::arm::Arm {
     return arm_->MoveThrough(program_id, poses, joints, guard);
   }
   absl::Status Stop() override { return arm_->Stop(); }
+  absl::Status StopOtherwise() override { return arm_->StopOtherwise(); }
+  gateway::arm::ForeignPrograms Foreign() const override { return arm_->Foreign(); }
   absl::Status PowerOn(const std::function<absl::Status()>& guard) override { return arm_->PowerOn(guard); }
   void SendHeartbeat() override { arm_->SendHeartbeat(); }
   gateway::timing::ClockEstimate ControllerClock() const override { return arm_->ControllerClock(); }

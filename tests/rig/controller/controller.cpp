@@ -97,6 +97,10 @@ class EmulatedController : public Controller {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.free();
   }
+  bool ProgramRuns() const override {
+    std::lock_guard<std::recursive_mutex> lock(mutex_);
+    return machine_.has_program();
+  }
   bool Moving() const override {
     std::lock_guard<std::recursive_mutex> lock(mutex_);
     return machine_.Moving();
@@ -164,7 +168,7 @@ class EmulatedController : public Controller {
     const bool room = clients_.size() < kMaxConnections;
     for (const int fd : listeners_)
       if (room) polled.push_back({fd, POLLIN, 0});
-    if (frozen_) return polled;
+    if (frozen_ || cut_off_) return polled;
     for (const Client& client : clients_)
       polled.push_back({client.connection.fd(),
                         static_cast<short>(POLLIN | (client.connection.Blocked() ? POLLOUT : 0)), 0});
@@ -185,6 +189,7 @@ class EmulatedController : public Controller {
         next = std::min(next, host_s + (machine_.NextCycleS() - sim_s) / clock_->speedup());
     }
     for (const Client& client : clients_) {
+      if (cut_off_) break;
       if (client.WantsData())
         next = std::min(next, host_s + (client.next_data_s - sim_s) / clock_->speedup());
       next = std::min(next, client.connection.NextReleaseS());
@@ -204,12 +209,23 @@ class EmulatedController : public Controller {
     if (!freeze && frozen_) machine_.Thaw(now_s);
     frozen_ = freeze;
     if (faults_ && faults_->Take("disconnect") != 0) clients_.clear();
-    if (frozen_) return;
+    const bool dark = faults_ && faults_->UntilHostS("power_cut") > 0;
+    if (dark && !dark_) machine_.LosePower();
+    if (!dark && dark_) machine_.Boot(now_s);
+    dark_ = dark;
+    if (dark_) clients_.clear();
+    cut_off_ = faults_ && faults_->UntilHostS("network") > 0;
+    if (frozen_ || dark_) return;
 
     // What was due before now comes first; then what clients have sent; watchdogs last.
     const auto changed = [this] {
       if (clock_->speedup() > 1) SendData(true);
     };
+    if (cut_off_) {  // the controller goes on; what was sent to it, and what it has to say, waits
+      machine_.Advance(now_s, nullptr);
+      machine_.CheckWatchdogs(nullptr);
+      return;
+    }
     SendDueData(now_s, changed);
     machine_.Advance(now_s, changed);
     input_came_ = false;
@@ -234,6 +250,10 @@ class EmulatedController : public Controller {
       while (clients_.size() < kMaxConnections) {
         const int fd = accept4(listeners_[port], nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd < 0) break;
+        if (dark_) {
+          close(fd);
+          continue;
+        }
         Client& client = clients_.emplace_back(static_cast<Port>(port), fd, machine_.LocalControl());
         client.next_data_s = machine_.now_s() + CycleBoundaryIn(machine_.now_s());
         if (port == kDashboard) client.connection.Send(std::string(kDashboardBanner) + "\n");
@@ -360,7 +380,7 @@ class EmulatedController : public Controller {
   int listeners_[kPorts];
   int wake_ = -1;
   Ports ports_;
-  bool frozen_ = false, input_came_ = false, readers_behind_ = false;
+  bool frozen_ = false, dark_ = false, cut_off_ = false, input_came_ = false, readers_behind_ = false;
   double next_state_s_ = 0, last_turn_s_ = 0;
   std::atomic<bool> stop_{false};
   std::unique_ptr<SimClock::Part> part_;

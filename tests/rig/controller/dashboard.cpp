@@ -9,6 +9,8 @@ namespace {
 
 std::string ModeName(int mode) {
   switch (mode) {
+    case kBooting:
+      return "BOOTING";
     case kPowerOff:
       return "POWER_OFF";
     case kPowerOn:
@@ -22,15 +24,8 @@ std::string ModeName(int mode) {
 }
 
 std::string SafetyName(int mode, bool status) {
-  switch (mode) {
-    case kNormal:
-      return "NORMAL";
-    case kProtectiveStop:
-      return "PROTECTIVE_STOP";
-    case kRobotEmergencyStop:
-      return "ROBOT_EMERGENCY_STOP";
-  }
-  return status ? "UNDEFINED" : "FAULT";
+  const std::string name = SafetyModeName(mode);
+  return !name.empty() ? name : status ? "UNDEFINED" : "FAULT";
 }
 
 bool StartsWith(const std::string& text, const std::string& with) {

@@ -6,7 +6,7 @@
 namespace touchstone::rig {
 namespace {
 
-enum class Range { kProbability, kPositive, kFinger, kSwitch, kSigned };
+enum class Range { kProbability, kPositive, kFinger, kSwitch, kSigned, kMode };
 struct Row {
   const char* name;
   Range range;
@@ -29,6 +29,9 @@ constexpr Row kRows[] = {
     {"disconnect", Range::kSwitch, 0, false},
     {"protective_stop", Range::kSwitch, 0, false},
     {"emergency_stop", Range::kSwitch, 0, false},
+    {"safety_mode", Range::kMode, 1, false},
+    {"power_cut", Range::kPositive, 0, true},
+    {"network", Range::kPositive, 0, true},
     {"speed_scaling", Range::kProbability, 1, false},
     {"speed_slider", Range::kProbability, 1, false},
     {"local_control", Range::kSwitch, 0, false},
@@ -58,6 +61,9 @@ std::string Complaint(const Row& row, double value) {
                  : which + "must be the index of a finger, or -1 for none";
     case Range::kSwitch:
       return value == 0 || value == 1 ? "" : which + "must be 0 or 1";
+    case Range::kMode:
+      return value >= 0 && value <= 255 && value == std::floor(value) ? ""
+                                                                      : which + "must be a whole number from 0 to 255";
     case Range::kSigned:
       return "";
   }

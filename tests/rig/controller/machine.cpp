@@ -10,7 +10,7 @@
 namespace touchstone::rig {
 namespace {
 
-constexpr double kPowerOnS = 1.0, kBootS = 1.5, kBrakesS = 1.0, kUnlockS = 0.5;
+constexpr double kControllerBootsS = 3, kPowerOnS = 1.0, kBootS = 1.5, kBrakesS = 1.0, kUnlockS = 0.5;
 constexpr double kUnlockAfterS = 5, kDashboardLagS = 0.6;
 // A late host catches up with that many control cycles of a waiting program at most; the rest are skipped.
 constexpr double kMaxCyclesAtOnce = 8;
@@ -130,8 +130,29 @@ void Machine::Thaw(double now_s) {
   DriveOn();
 }
 
+void Machine::LosePower() {
+  PowerOff();
+  registers_ = {};
+  flange_from_tip_ = Eigen::Isometry3d::Identity();
+  payload_kg_ = 0;
+  payload_cog_m_ = Eigen::Vector3d::Zero();
+  force_zero_n_.setZero();
+  SetSafety(kNormal);
+  announcements_.clear();
+}
+
+void Machine::Boot(double now_s) {
+  now_s_ = std::max(now_s_, now_s);
+  booted_at_s_ = CycleAtOrAfter(now_s_);
+  robot_mode_ = kBooting;
+  Later(kControllerBootsS, [this] {
+    robot_mode_ = kPowerOff;
+    changed_ = true;
+  });
+}
+
 void Machine::PowerOn() {
-  if (robot_mode_ != kPowerOff || safety_mode_ == kRobotEmergencyStop) return;
+  if (robot_mode_ != kPowerOff || emergency_) return;
   later_.clear();
   Later(kPowerOnS, [this] {
     robot_mode_ = kPowerOn;
@@ -144,7 +165,7 @@ void Machine::PowerOn() {
 }
 
 void Machine::ReleaseBrakes() {
-  if (robot_mode_ == kRunning || safety_mode_ == kRobotEmergencyStop) return;
+  if (robot_mode_ == kRunning || robot_mode_ == kBooting || emergency_) return;
   later_.clear();
   const double wait_s = robot_mode_ == kIdle ? 0 : robot_mode_ == kPowerOn ? kBootS : kPowerOnS + kBootS;
   if (robot_mode_ == kPowerOff) Later(kPowerOnS, [this] { robot_mode_ = kPowerOn; });
@@ -183,13 +204,29 @@ int Machine::LaggingSafetyMode() const {
 }
 
 void Machine::ProtectiveStop(int code, const std::string& why) {
-  if (safety_mode_ != kNormal) return;
+  if (!SafetyPermitsMotion()) return;
   ++protective_stops_;
   stopped_at_s_ = now_s_;
   SetSafety(kProtectiveStop);
   Announce({Announcement::kError, "", why, code, 0});
-  if (script_) EndProgram();
+  PauseForSafety();
+  // What it would collide with lies ahead: the motion is given up, and a program that goes on begins its next one.
   Halt();
+}
+
+void Machine::PauseForSafety() {
+  if (!script_ || paused_) return;
+  paused_ = changed_ = true;
+  DriveOn();
+}
+
+void Machine::TakeSafetyMode(int mode) {
+  if (mode == kSystemEmergencyStop || mode == kRobotEmergencyStop || mode == kImmiEmergencyStop ||
+      mode == kProfisafeEmergencyStop)
+    return EmergencyStop(mode);
+  emergency_ = false;
+  SetSafety(mode);
+  if (!SafetyPermitsMotion()) PauseForSafety();
 }
 
 bool Machine::LocalControl() const {
@@ -205,21 +242,19 @@ bool Machine::Unlock() {
   return true;
 }
 
-void Machine::EmergencyStop(bool pressed) {
-  emergency_ = pressed;
-  if (pressed) {
-    PowerOff();
-    SetSafety(kRobotEmergencyStop);
-  } else {
-    SetSafety(kNormal);
-  }
+void Machine::EmergencyStop(int mode) {
+  emergency_ = true;
+  PowerOff();
+  SetSafety(mode);
 }
 
 void Machine::LookAtFaults() {
   if (!faults_) return;
   if (faults_->Take("protective_stop") != 0) ProtectiveStop(153, "emulated protective stop");
-  const bool pressed = faults_->Get("emergency_stop") != 0;
-  if (pressed != emergency_) EmergencyStop(pressed);
+  const int wanted = faults_->Get("emergency_stop") != 0 ? static_cast<int>(kRobotEmergencyStop)
+                                                         : static_cast<int>(faults_->Get("safety_mode"));
+  if (wanted != safety_fault_) TakeSafetyMode(wanted);
+  safety_fault_ = wanted;
   Rescale();
 }
 
@@ -249,6 +284,13 @@ void Machine::SetTool(const Eigen::Isometry3d& flange_from_tip) {
 void Machine::SetPayload(double kg, const std::optional<Eigen::Vector3d>& cog_m) {
   payload_kg_ = kg;
   payload_cog_m_ = cog_m;
+  ZeroForceSensor();
+}
+
+void Machine::ZeroForceSensor() {
+  if (!e_series()) return;
+  const Eigen::Isometry3d flange = ActualFlangeAt(now_s_);
+  force_zero_n_ = flange.linear().transpose() * ForceOnTip(flange * flange_from_tip_);
 }
 
 void Machine::Announce(Announcement announcement) {

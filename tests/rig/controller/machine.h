@@ -19,8 +19,21 @@
 
 namespace touchstone::rig {
 
-enum RobotMode { kPowerOff = 3, kPowerOn = 4, kIdle = 5, kRunning = 7 };
-enum SafetyMode { kNormal = 1, kProtectiveStop = 3, kRobotEmergencyStop = 7 };
+enum RobotMode { kBooting = 2, kPowerOff = 3, kPowerOn = 4, kIdle = 5, kRunning = 7 };
+// Those that the rest of the emulator names; others can be set as a fault (UR's client library, ur/datatypes.h).
+enum SafetyMode {
+  kNormal = 1,
+  kReduced = 2,
+  kProtectiveStop = 3,
+  kRecovery = 4,
+  kSafeguardStop = 5,
+  kSystemEmergencyStop = 6,
+  kRobotEmergencyStop = 7,
+  kImmiEmergencyStop = 15,
+  kProfisafeEmergencyStop = 20,
+};
+// "PROTECTIVE_STOP"; "" for a number without a name.
+std::string SafetyModeName(int mode);
 enum RuntimeState { kStopping = 0, kStopped = 1, kPlaying = 2, kPausing = 3, kPaused = 4 };
 
 struct Registers {
@@ -77,6 +90,10 @@ class Machine : public ScriptHost {
   // Stands still and does nothing, or goes on.
   void Freeze(double now_s);
   void Thaw(double now_s);
+  // The controller loses its power, and boots when it comes back: registers, tool and payload are gone, its clock begins
+  // anew, and the arm is off.
+  void LosePower();
+  void Boot(double now_s);
 
   // Programs. Errors become announcements. Like everything else that the controller does by itself, programs run at
   // the cycles of its clock.
@@ -85,6 +102,7 @@ class Machine : public ScriptHost {
   bool PauseProgram();   // likewise
   bool ResumeProgram();  // false: none was paused
   bool program_running() const { return script_ != nullptr && !paused_; }
+  bool has_program() const { return script_ != nullptr; }
 
   // Dashboard.
   void PowerOn();
@@ -131,7 +149,13 @@ class Machine : public ScriptHost {
   // Without a centre of gravity the tool centre point is, now and whenever it is set (UR's script manual, SW 5.x,
   // set_payload). Flange frame.
   void SetPayload(double kg, const std::optional<Eigen::Vector3d>& cog_m);
-  void SetPayloadMass(double kg) { payload_kg_ = kg; }
+  void SetPayloadMass(double kg) {
+    payload_kg_ = kg;
+    ZeroForceSensor();
+  }
+  // An e-Series also does this whenever a payload is set (UR's script manual SW 10.6, set_target_payload: "The force/torque
+  // measurements are automatically zeroed when setting the payload"); a CB3 has no sensor.
+  void ZeroForceSensor();
   Eigen::Vector3d PayloadCog() const {
     return payload_cog_m_.value_or(Eigen::Vector3d(flange_from_tip_.translation()));
   }
@@ -166,7 +190,12 @@ class Machine : public ScriptHost {
   void EndProgram();
   void Halt();  // brings the arm to rest as fast as it can
   void ProtectiveStop(int code, const std::string& why);
-  void EmergencyStop(bool pressed);
+  void EmergencyStop(int mode);
+  bool SafetyPermitsMotion() const { return safety_mode_ == kNormal || safety_mode_ == kReduced; }
+  // As a safety function does: the program is paused, not ended (README.md), and the arm brakes.
+  void PauseForSafety();
+  void TakeSafetyMode(int mode);  // of a fault
+  Eigen::Vector3d ForceOnTip(const Eigen::Isometry3d& base_from_tip) const;  // base frame, before any zeroing
   void LookAtFaults();
   void Rescale();
   double DrivenSpeed(const Motion& motion) const;  // as commanded, times limiter and slider; 0 while paused
@@ -197,6 +226,9 @@ class Machine : public ScriptHost {
   int robot_mode_ = kPowerOff, safety_mode_ = kNormal;
   double stopped_at_s_ = -1e9;
   bool emergency_ = false, frozen_ = false;
+  int safety_fault_ = kNormal;
+  double booted_at_s_ = 0;
+  Eigen::Vector3d force_zero_n_ = Eigen::Vector3d::Zero();  // flange frame; what the sensor shows less
   bool free_ = false;  // for a hand, while the program runs that asked for it
   double frozen_at_s_ = 0;
   std::vector<std::pair<double, int>> safety_history_;

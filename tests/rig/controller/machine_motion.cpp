@@ -75,7 +75,7 @@ void Machine::SetSpeedSlider(double fraction) {
 void Machine::RequireReady() const {
   if (in_secondary_) throw ScriptError("a secondary program cannot move the robot");
   if (robot_mode_ != kRunning) throw ScriptError("the robot is not running: it cannot move");
-  if (safety_mode_ != kNormal) throw ScriptError("the safety mode is not normal: the robot cannot move");
+  if (!SafetyPermitsMotion()) throw ScriptError("the safety mode is not normal: the robot cannot move");
 }
 
 bool Machine::MustWaitToMove(int thread, bool keeps_going) {

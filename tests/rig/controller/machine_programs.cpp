@@ -17,7 +17,7 @@ void Machine::StartProgram(const std::string& script) {
     Announce({Announcement::kException, "", error.what(), error.line, error.column});
     return;
   }
-  if (robot_mode_ != kRunning || safety_mode_ != kNormal) {
+  if (robot_mode_ != kRunning || !SafetyPermitsMotion()) {
     Announce({Announcement::kError, "",
               "program '" + program.name + "' was not started: robot mode " + std::to_string(robot_mode_) +
                   ", safety mode " + std::to_string(safety_mode_),
@@ -29,6 +29,12 @@ void Machine::StartProgram(const std::string& script) {
     in_secondary_ = true;
     machine.Run(now_s_);
     in_secondary_ = false;
+    return;
+  }
+  // The first program that is sent to a paused one only ends it (UniversalRobots/Universal_Robots_Client_Library, issue
+  // 123).
+  if (script_ && paused_) {
+    StopProgram();
     return;
   }
   if (script_) EndProgram();
@@ -55,7 +61,7 @@ bool Machine::PauseProgram() {
 }
 
 bool Machine::ResumeProgram() {
-  if (!script_ || !paused_ || safety_mode_ != kNormal) return false;
+  if (!script_ || !paused_ || !SafetyPermitsMotion()) return false;
   paused_ = false;
   changed_ = true;
   script_due_s_ = CycleAtOrAfter(now_s_);

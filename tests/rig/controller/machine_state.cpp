@@ -8,6 +8,7 @@
 // normal noise here (options; speeds 50 times as much while it moves). Speeds are trapezoids, as in the log: level at
 // the commanded 60 deg/s between straight ramps.
 #include <cmath>
+#include <map>
 
 #include "tests/rig/controller/machine_motion.h"
 
@@ -16,7 +17,58 @@ namespace {
 
 constexpr double kFirstTimestampS = 60;  // whole cycles; some clients wait for a time stamp of 40 s
 
+// UR's RTDE guide, safety_status_bits; 10: stopped by safety.
+uint32_t SafetyBits(int mode) {
+  constexpr uint32_t kStopped = 1u << 10;
+  switch (mode) {
+    case kNormal:
+      return 1;
+    case kReduced:
+      return 1u << 1;
+    case kProtectiveStop:
+      return 1u << 2 | kStopped;
+    case kRecovery:
+      return 1u << 3 | kStopped;
+    case kSafeguardStop:
+      return 1u << 4 | kStopped;
+    case kSystemEmergencyStop:
+      return 1u << 5 | 1u << 7 | kStopped;
+    case kRobotEmergencyStop:
+      return 1u << 6 | 1u << 7 | kStopped;
+    default:
+      return kStopped;
+  }
+}
+
 }  // namespace
+
+// UR's client library, ur/datatypes.h; 23 is of ur_dashboard_msgs/SafetyStatus.
+std::string SafetyModeName(int mode) {
+  static const std::map<int, std::string> names = {{1, "NORMAL"},
+                                                   {2, "REDUCED"},
+                                                   {3, "PROTECTIVE_STOP"},
+                                                   {4, "RECOVERY"},
+                                                   {5, "SAFEGUARD_STOP"},
+                                                   {6, "SYSTEM_EMERGENCY_STOP"},
+                                                   {7, "ROBOT_EMERGENCY_STOP"},
+                                                   {8, "VIOLATION"},
+                                                   {9, "FAULT"},
+                                                   {10, "VALIDATE_JOINT_ID"},
+                                                   {11, "UNDEFINED_SAFETY_MODE"},
+                                                   {12, "AUTOMATIC_MODE_SAFEGUARD_STOP"},
+                                                   {13, "SYSTEM_THREE_POSITION_ENABLING_STOP"},
+                                                   {14, "TP_THREE_POSITION_ENABLING_STOP"},
+                                                   {15, "IMMI_EMERGENCY_STOP"},
+                                                   {16, "IMMI_SAFEGUARD_STOP"},
+                                                   {17, "PROFISAFE_WAITING_FOR_PARAMETERS"},
+                                                   {18, "PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP"},
+                                                   {19, "PROFISAFE_SAFEGUARD_STOP"},
+                                                   {20, "PROFISAFE_EMERGENCY_STOP"},
+                                                   {22, "SAFETY_API_SAFEGUARD_STOP"},
+                                                   {23, "IO_PLANE_STOP"}};
+  const auto found = names.find(mode);
+  return found == names.end() ? "" : found->second;
+}
 
 Joints Machine::JointsAt(double time_s) const {
   if (past_ && time_s < past_end_s_) return past_->path->JointsAt(past_->profile->LengthAt(time_s));
@@ -52,10 +104,19 @@ Vector6 Machine::TipSpeed(const JointMotion& joints) const {
   return speed;
 }
 
+// The fingers are springs; what they press back with acts on the tip against its axis.
+Eigen::Vector3d Machine::ForceOnTip(const Eigen::Isometry3d& base_from_tip) const {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  if (!faults_) return force;
+  if (tip_) force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * base_from_tip.linear().col(2);
+  force.z() -= faults_->Get("force_offset_n");
+  return force;
+}
+
 RobotState Machine::State() {
   RobotState state;
   const double cycle_time_s = std::floor(now_s_ / cycle_s_ + 1e-6) * cycle_s_;
-  state.timestamp_s = kFirstTimestampS + cycle_time_s;
+  state.timestamp_s = kFirstTimestampS + cycle_time_s - booted_at_s_;
   const JointMotion target = TargetAt(cycle_time_s),
                     actual = TargetAt(cycle_time_s - options_.following_lag_s);
   state.target_q = target.q, state.target_qd = target.qd, state.target_qdd = target.qdd;
@@ -79,13 +140,8 @@ RobotState Machine::State() {
     state.actual_tcp_force[i] = noise(options_.position_noise_m > 0 ? (i < 3 ? 0.3 : 0.01) : 0);
   }
 
-  // The fingers are springs; what they press back with acts on the tip against its axis.
-  const Eigen::Isometry3d pressing = BaseFromFlange(geometry_, actual.q) * flange_from_tip_;
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  if (tip_ && faults_)
-    force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * pressing.linear().col(2);
-  if (faults_) force.z() -= faults_->Get("force_offset_n");
-  state.actual_tcp_force.head<3>() += force;
+  const Eigen::Isometry3d flange = BaseFromFlange(geometry_, actual.q);
+  state.actual_tcp_force.head<3>() += ForceOnTip(flange * flange_from_tip_) - flange.linear() * force_zero_n_;
 
   state.robot_mode = robot_mode_;
   state.safety_mode = safety_mode_;
@@ -93,9 +149,7 @@ RobotState Machine::State() {
       script_ ? (paused_ ? (Moving() ? kPausing : kPaused) : kPlaying) : (motion_ ? kStopping : kStopped);
   state.program_running = program_running();
   state.robot_status_bits = (robot_mode_ >= kPowerOn ? 1u : 0u) | (program_running() ? 2u : 0u);
-  state.safety_status_bits = safety_mode_ == kNormal           ? 1u
-                             : safety_mode_ == kProtectiveStop ? (1u << 2) | (1u << 10)
-                                                               : (1u << 6) | (1u << 7) | (1u << 10);
+  state.safety_status_bits = SafetyBits(safety_mode_);
   state.speed_scaling = limiter_;
   state.target_speed_fraction = slider_;
   state.digital_inputs = digital_inputs();

@@ -103,6 +103,11 @@ const std::vector<BuiltinRow>& MainRows() {
          m.SetPayload(PayloadOf(x[0]), CogOf(x[1]));
          return Outcome{};
        }},
+      {{"zero_ftsensor", {}, 0},
+       [](Machine& m, const Arguments&, int) {
+         m.ZeroForceSensor();
+         return Outcome{};
+       }},
       {{"set_gravity", {"d"}, 1}, Nothing},
       // A hand may move the arm. The first pair is of the e-Series, the second of both series (script manuals).
       {{"freedrive_mode", {"freeAxes", "feature"}, 0},

@@ -77,7 +77,6 @@ std::vector<BuiltinRow> OtherBuiltins() {
          m.RequestProtectiveStop();
          return Outcome{Outcome::Wait::kCycle, {}, 0};
        }},
-      {{"zero_ftsensor", {}, 0}, Nothing},
       {{"end_force_mode", {}, 0}, Nothing},
       {{"force_mode_set_damping", {"damping"}, 1}, Nothing},
       {{"force_mode_set_gain_scaling", {"scaling"}, 1}, Nothing},
