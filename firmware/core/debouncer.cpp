@@ -23,6 +23,7 @@ Debouncer::Change Debouncer::OnEdge(bool active, uint64_t ticks) {
   }
   edge_count_ = kept < kEdges ? kept : kEdges - 1;
   edges_[edge_count_++] = ticks;
+  if (bucket_ == 0 && ticks > updated_) updated_ = ticks;
   if (hold_ == 0) change = Settle(ticks);
   return change;
 }
@@ -31,8 +32,10 @@ Debouncer::Change Debouncer::Advance(uint64_t now) {
   if (now <= updated_) return {};
   const uint64_t passed = now - updated_;
   if (level_ == settled_) {
-    bucket_ -= bucket_ < passed ? bucket_ : passed;
-    updated_ = now;
+    // Once it is empty nothing depends on the time: an edge that is handled late counts from its own.
+    const uint64_t drained = bucket_ < passed ? bucket_ : passed;
+    bucket_ -= drained;
+    updated_ += drained;
     return {};
   }
   if (bucket_ + passed < hold_) {

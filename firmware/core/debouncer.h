@@ -24,8 +24,8 @@ class Debouncer {
 
   // The state is settled as it is.
   void Reset(bool active, uint64_t hold_ticks, uint64_t now);
-  // The pin's level changed; what settled before this edge is reported. An edge older than Advance's last time
-  // counts from there on, but keeps its own time.
+  // The pin's level changed; what settled before this edge is reported. An edge older than Advance's last time counts
+  // from its own if the switch was at rest, else from there on; it keeps its own time in either case.
   Change OnEdge(bool active, uint64_t ticks);
   // Time has passed without an edge.
   Change Advance(uint64_t now);

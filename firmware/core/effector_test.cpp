@@ -49,6 +49,38 @@ TEST(Effector, KeepsTheRecordAndTheEventsThroughHello) {
   EXPECT_FALSE(device.Take(&event));
 }
 
+// An edge's time is captured by the hardware; how late it is handled must not cost what PROTOCOL.md promises.
+TEST(Effector, ABounceCostsNothingHoweverLateItsEdgesAreHandled) {
+  constexpr uint64_t kDebounceUs = 5000;
+  FingerConfig config;
+  config.sensor = Sensor::kMicroswitch;
+  config.debounce_us = kDebounceUs;
+  uint32_t random = 1;
+  for (uint64_t late_us : {0, 900, 4000, 8000, 20000}) {
+    for (int round = 0; round < 20; ++round) {
+      TestDevice device;
+      ASSERT_TRUE(device.DoConfigure(1, config));
+      ASSERT_TRUE(device.DoArm(1));
+      device.RunMs(30);
+      const uint64_t contact = device.now() + 137;
+      bool level = true;
+      for (uint64_t at = contact; level || at < contact + 4000;) {
+        device.RunTo(at + late_us);
+        device.EdgeAt(0, level, at);
+        random = random * 1664525 + 1013904223;
+        at += 50 + random % 300;
+        level = !level;
+      }
+      device.RunTo(contact + late_us + 3 * kDebounceUs);
+      Event event;
+      ASSERT_TRUE(device.Take(&event)) << late_us;
+      EXPECT_EQ(event.kind, EventKind::kContact);
+      EXPECT_EQ(event.ticks, contact) << "edges handled " << late_us << " us late, round " << round;
+      EXPECT_FALSE(device.Take(&event)) << "one press";
+    }
+  }
+}
+
 TEST(Effector, RecordsNothingBeforeArmAndAfterDisarm) {
   TestDevice device;
   ASSERT_TRUE(device.DoConfigure(2, FingerConfig{}));

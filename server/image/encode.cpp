@@ -10,6 +10,7 @@
 #include <turbojpeg.h>
 
 #include "server/base/status.h"
+#include "server/image/whole_picture.h"
 
 namespace touchstone::image {
 namespace {
@@ -176,6 +177,7 @@ absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int hei
 
 absl::StatusOr<Image> DecodePng(const std::string& png) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckWholePicture(png));
   const bool grey = open.header.color_type == SPNG_COLOR_TYPE_GRAYSCALE && open.header.bit_depth <= 8;
   return Decode(open, grey);
 }
@@ -196,6 +198,7 @@ absl::StatusOr<Image> DecodePicture(const std::string& bytes) {
         "JPEG: is %d x %d pixels; each side must be from 1 to %d", image.width, image.height, kMaxImageSide));
   if (colours == TJCS_CMYK || colours == TJCS_YCCK)
     return absl::InvalidArgumentError("JPEG: holds inks for print (CMYK); grey or RGB was expected");
+  TOUCHSTONE_RETURN_IF_ERROR(CheckWholePicture(bytes));
   image.channels = colours == TJCS_GRAY ? 1 : 3;
   image.pixels.resize(static_cast<size_t>(image.width) * image.height * image.channels);
   if (tjDecompress2(handle, data, bytes.size(), image.pixels.data(), image.width, 0, image.height,
@@ -213,10 +216,8 @@ absl::StatusOr<Image> DecodePlainPng(absl::string_view png) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const OpenPng open, Open(png));
   TOUCHSTONE_ASSIGN_OR_RETURN(const PictureSize size, PlainSize(open.header));
   TOUCHSTONE_ASSIGN_OR_RETURN(Image image, Decode(open, size.channels == 1));
-  // The pixels may be whole although the end of the file is missing, whose checksum libspng does not look at.
-  static constexpr absl::string_view kEnd("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
-  if (!absl::EndsWith(png, kEnd))
-    return absl::InvalidArgumentError("PNG: does not end with its last chunk (IEND); is the file cut off?");
+  // The pixels may be whole although the end of the file is missing.
+  TOUCHSTONE_RETURN_IF_ERROR(CheckWholePicture(png));
   if (int code = spng_decode_chunks(open.context.get()); code != 0) return BadPng("after the pixels", code);
   spng_trns transparency{};
   if (spng_get_trns(open.context.get(), &transparency) == 0)

@@ -15,10 +15,10 @@ absl::StatusOr<std::string> EncodePng(const uint8_t* pixels, int width, int heig
 absl::StatusOr<std::string> EncodeJpeg(const uint8_t* pixels, int width, int height, int channels,
                                        int quality);
 
-// For tests and clients; refuses more than kMaxImageSide per side.
+// For tests and clients; refuses more than kMaxImageSide per side, and what is not whole (whole_picture.h).
 absl::StatusOr<Image> DecodePng(const std::string& png);
 
-// A PNG or JPEG file, whichever its first bytes say.
+// A PNG or JPEG file, whichever its first bytes say; likewise.
 absl::StatusOr<Image> DecodePicture(const std::string& bytes);
 
 struct PictureSize {

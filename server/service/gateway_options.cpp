@@ -86,6 +86,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, RawGatewayFlags* raw) {
        &o.camera.intrinsics},
       {"camera.vertical_fov_deg", "", &raw->vertical_fov_deg},
       {"camera.timeout_s", "", &o.camera.timeout_s},
+      {"camera.latency_s", "From a picture's exposure until it is here; older ones are thrown away",
+       &o.camera.latency_s},
       {"camera.pose_tolerance_mm", "A photograph from farther off its commanded pose is refused",
        &o.pose_tolerance_mm},
       {"camera.pose_tolerance_deg", "The same of its direction", &o.pose_tolerance_deg},

@@ -222,19 +222,20 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
                               resources_->objects.Find(request.object(), "object"));
   TOUCHSTONE_RETURN_IF_ERROR(
       source::CheckTouchCount(request.touches_size(), resources_->options.OfSource(), 0));
-  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::arm::ArmState from, rig_->arm().State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::Rig::DryRun run, rig_->BeginDryRun());
   const geometry::Bounds bounds = object->surface->bounds();
   for (int k = 0; k < request.touches_size(); ++k) {
     const std::string where = absl::StrCat("touches[", k, "]");
     TOUCHSTONE_ASSIGN_OR_RETURN(const touch::CommandedTouch touch, FromProto(request.touches(k), where));
     v1::TouchCheck* check = response->add_checks();
-    check->set_up_face(static_cast<v1::UpFace>(gateway::calibration::UpFaceFor(touch.approach)));
+    const gateway::calibration::UpFace up_face = gateway::calibration::UpFaceFor(touch.approach);
+    check->set_up_face(static_cast<v1::UpFace>(up_face));
+    TOUCHSTONE_RETURN_IF_ERROR(rig_->MountInDryRun(request.object(), up_face, &run));
     const absl::StatusOr<gateway::arm::PlannedTouch> plan =
-        rig_->Check(request.object(), bounds, touch, &from, where);
+        rig_->Check(request.object(), bounds, touch, &run.at, where);
     check->set_possible(plan.ok());
     const gateway::arm::MotionPlanner& planner = rig_->planner();
-    if (const auto lies =
-            planner.ObjectPose(request.object(), bounds, gateway::calibration::UpFaceFor(touch.approach));
+    if (const auto lies = planner.ObjectPose(request.object(), bounds, up_face);
         request.path() && lies.ok()) {
       *check->mutable_base_from_object() = PoseToProto(*lies);
       *check->mutable_object_min_m() = ToProto(bounds.min_m);
@@ -247,14 +248,14 @@ absl::Status RigService::DoCheck(const v1::CheckTouchesRequest& request, v1::Che
     check->set_duration_s(plan->motion.duration_s);
     for (const std::string& note : plan->notes) check->add_notes(note);
     // The next one begins where this one ends: at its start.
-    from.base_from_tip = plan->motion.transit.back();
-    from.joints_rad = plan->start_joints_rad;
+    run.at.base_from_tip = plan->motion.transit.back();
+    run.at.joints_rad = plan->start_joints_rad;
     if (!request.path()) continue;
     for (const Eigen::Isometry3d& pose : plan->motion.transit) *check->add_path() = PoseToProto(pose);
     *check->add_path() = PoseToProto(plan->motion.end);
     check->set_transit_poses(plan->motion.transit.size());
     TOUCHSTONE_RETURN_IF_ERROR(
-        DescribePosture(*rig_, from.base_from_tip, plan->start_joints_rad, check->mutable_start_posture()));
+        DescribePosture(*rig_, run.at.base_from_tip, plan->start_joints_rad, check->mutable_start_posture()));
     TOUCHSTONE_RETURN_IF_ERROR(
         DescribePosture(*rig_, plan->motion.end, plan->end_joints_rad, check->mutable_end_posture()));
   }

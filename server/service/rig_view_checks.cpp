@@ -24,7 +24,7 @@ absl::Status RigService::DoCheck(const v1::CheckViewsRequest& request, v1::Check
   const int max_views = resources_->options.OfSource().max_touches_per_request;
   if (request.views_size() > max_views)
     return OverLimit("views has", request.views_size(), "max_touches_per_request", max_views);
-  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::arm::ArmState from, rig_->arm().State());
+  TOUCHSTONE_ASSIGN_OR_RETURN(gateway::Rig::DryRun run, rig_->BeginDryRun());
   for (int k = 0; k < request.views_size(); ++k) {
     const std::string where = absl::StrCat("views[", k, "]");
     TOUCHSTONE_ASSIGN_OR_RETURN(const image::Camera camera, FromProto(request.views(k), where));
@@ -33,17 +33,19 @@ absl::Status RigService::DoCheck(const v1::CheckViewsRequest& request, v1::Check
     const source::ViewCommand command{"", request.object(), object->surface->bounds(),
                                       source::ObjectFromCamera(camera), std::nullopt};
     v1::TouchCheck* check = response->add_checks();
-    check->set_up_face(static_cast<v1::UpFace>(
-        gateway::calibration::UpFaceFor(command.object_from_camera.rotation().col(2))));
-    const absl::StatusOr<gateway::arm::PlannedTouch> plan = rig_->CheckView(command, &from, where);
+    const gateway::calibration::UpFace up_face =
+        gateway::calibration::UpFaceFor(command.object_from_camera.rotation().col(2));
+    check->set_up_face(static_cast<v1::UpFace>(up_face));
+    TOUCHSTONE_RETURN_IF_ERROR(rig_->MountInDryRun(request.object(), up_face, &run));
+    const absl::StatusOr<gateway::arm::PlannedTouch> plan = rig_->CheckView(command, &run.at, where);
     check->set_possible(plan.ok());
     if (!plan.ok()) {
       check->set_reason(std::string(plan.status().message()));
       continue;
     }
     check->set_duration_s(plan->motion.duration_s);
-    from.base_from_tip = plan->motion.transit.back();
-    from.joints_rad = plan->start_joints_rad;
+    run.at.base_from_tip = plan->motion.transit.back();
+    run.at.joints_rad = plan->start_joints_rad;
     if (!request.path()) continue;
     for (const Eigen::Isometry3d& pose : plan->motion.transit)
       *check->add_path() = session::BasePoseMessage(geometry::PoseVectorOf(pose));

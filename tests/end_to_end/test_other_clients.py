@@ -163,6 +163,11 @@ near(lambda: [receive.getPayload(), *receive.getPayloadCog()], [0.4, 0, 0, 0.03]
 assert control.setTcp([0, 0, 0.1, 0, 0, 0])
 near(control.getTCPOffset, [0, 0, 0.1, 0, 0, 0])
 near(lambda: control.getInverseKinematics(receive.getActualTCPPose(), receive.getActualQ()), receive.getActualQ())
+joints = receive.getActualQ()
+tip = control.getForwardKinematics(joints, [0, 0, 0.1, 0, 0, 0])
+near(lambda: tip[:3], receive.getActualTCPPose()[:3])
+# Given a tool of zeros ur_rtde 1.6.5 sends 12 numbers of a recipe of 6: an answer, but of the tool that was given before.
+near(lambda: control.getForwardKinematics(joints, [0] * 6), tip)
 assert control.isSteady()
 # An asynchronous motion that is stopped on its way.
 pose = receive.getActualTCPPose()

@@ -32,6 +32,26 @@ TEST_F(Accuracy, DifferencesOfContactTimesAreRightDespiteDriftAndADelayingLine) 
   }
 }
 
+// PROTOCOL.md: a bounce of up to the debounce time costs no accuracy.
+TEST_F(Accuracy, ABouncingSwitchCostsNone) {
+  StartRig([](rig::EmulatorOptions* options) {
+    options->sensor = "microswitch";
+    options->faults = {{"bounce", 1}};
+  });
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  for (int k = 0; k < 6; ++k) {
+    const Answer answer = Touch(lease.token(), FromAbove(0.02, k % 3), "touch " + std::to_string(k));
+    ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
+    if (k < 2) continue;
+    const rig::TouchTruth truth = emulator_->Touches().back();
+    for (int i = 1; i < 3; ++i)
+      EXPECT_NEAR(answer.response.results(0).contact_time_s(i) - answer.response.results(0).contact_time_s(0),
+                  truth.reported_s[i] - truth.reported_s[0], 50e-6)
+          << "touch " << k << ", finger " << i;
+  }
+}
+
 TEST_F(Accuracy, PosesAtContactAreWhereTheTipWas) {
   StartRig([](rig::EmulatorOptions* options) { options->speedup = 4; });
   StartGateway();

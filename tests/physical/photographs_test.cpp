@@ -2,7 +2,10 @@
 // emulated rig's data stand for no measurement.
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "server/base/full_disk.h"
+#include "server/base/units.h"
 #include "server/service/stored_session.h"
 #include "server/session/emulated.h"
 #include "server/session/image_set_file.h"
@@ -30,14 +33,18 @@ class GatewayPhotographs : public PhysicalTest {
   };
   // From straight above lat00, so far to the side.
   Picture Capture(const std::string& token, double side_m) {
+    v1::CameraPose camera;
+    camera.mutable_eye_m()->set_x(side_m);
+    camera.mutable_eye_m()->set_z(0.25);
+    camera.mutable_at_m()->set_x(side_m);
+    camera.mutable_up()->set_y(1);
+    return Capture(token, camera);
+  }
+  Picture Capture(const std::string& token, const v1::CameraPose& camera) {
     v1::CaptureRequest request;
     request.set_object("lat00");
     request.set_lease_token(token);
-    v1::CameraPose* camera = request.add_views()->mutable_camera();
-    camera->mutable_eye_m()->set_x(side_m);
-    camera->mutable_eye_m()->set_z(0.25);
-    camera->mutable_at_m()->set_x(side_m);
-    camera->mutable_up()->set_y(1);
+    *request.add_views()->mutable_camera() = camera;
     request.mutable_image()->set_width(kWidth);
     request.mutable_image()->set_height(kHeight);
     Picture picture;
@@ -131,6 +138,65 @@ TEST_F(GatewayPhotographs, ThatWereAcknowledgedOutliveAKilledGatewayAndAreAnImag
   const v1::Session described = Describe();
   EXPECT_EQ(described.images(), 3u);
   EXPECT_EQ(described.hash(), set->sha256);
+}
+
+// Which way round a controller turns the tool on a line of half a turn depends on rounding. Driven the other way than was
+// checked, the arm wound its wrist up to where no path led on, or stopped protectively out of its reach.
+TEST_F(GatewayPhotographs, StandWhicheverWayRoundAControllerTurnsTheToolByHalfATurn) {
+  StartEmulator();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  const auto from = [](double azimuth_deg, double polar_deg, double x_m) {
+    const double azimuth_rad = azimuth_deg * kRadiansPerDegree, polar_rad = polar_deg * kRadiansPerDegree;
+    v1::CameraPose camera;
+    camera.mutable_eye_m()->set_x(x_m + 0.25 * std::sin(polar_rad) * std::cos(azimuth_rad));
+    camera.mutable_eye_m()->set_y(0.25 * std::sin(polar_rad) * std::sin(azimuth_rad));
+    camera.mutable_eye_m()->set_z(0.25 * std::cos(polar_rad));
+    camera.mutable_at_m()->set_x(x_m);
+    camera.mutable_up()->set_z(1);
+    return camera;
+  };
+  for (const double longer : {0.0, 1.0}) {
+    ASSERT_EQ(emulator_->faults().Set("half_turn_longer", longer), "");
+    for (const double azimuth_deg : {0.0, 180.0, 15.0, 195.0, 30.0, 210.0}) {
+      const Picture picture = Capture(lease.token(), from(azimuth_deg, 30, 0));
+      EXPECT_TRUE(picture.status.ok())
+          << "at " << azimuth_deg << " deg, longer way " << longer << ": " << picture.status.error_message();
+    }
+    // At the end of its reach: what cannot be driven is refused beforehand.
+    for (const double azimuth_deg : {135.0, 315.0}) {
+      const Picture picture = Capture(lease.token(), from(azimuth_deg, 38, -0.03));
+      EXPECT_TRUE(picture.status.ok() || picture.status.error_code() == grpc::StatusCode::OUT_OF_RANGE)
+          << "at " << azimuth_deg << " deg, longer way " << longer << ": " << picture.status.error_message();
+    }
+  }
+  EXPECT_EQ(emulator_->controller().Count("protective_stops"), 0u);
+}
+
+// A rig that turns the object goes home before: a dry run from the picture before found ways that are not gone.
+TEST_F(GatewayPhotographs, OfAnotherFaceAreCheckedFromHome) {
+  StartEmulator();
+  StartGateway();
+  const auto way_to_the_second = [&](double first_x_m) {
+    v1::CheckViewsRequest request;
+    request.set_object("lat00");
+    request.set_path(true);
+    v1::CameraPose* first = request.add_views()->mutable_camera();
+    first->mutable_eye_m()->set_x(first_x_m);
+    first->mutable_eye_m()->set_z(0.25);
+    first->mutable_up()->set_y(1);
+    v1::CameraPose* second = request.add_views()->mutable_camera();
+    second->mutable_eye_m()->set_x(0.25);
+    second->mutable_up()->set_z(1);
+    v1::CheckTouchesResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status = rig_->CheckViews(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(response.checks_size(), 2);
+    EXPECT_TRUE(response.checks(1).possible()) << response.checks(1).reason();
+    return response.checks(1).ShortDebugString();
+  };
+  EXPECT_EQ(way_to_the_second(0), way_to_the_second(0.06));
 }
 
 TEST_F(GatewayPhotographs, AreNotTakenOnAFullDiskAndStandBesideTheTouchesOfTheirSession) {

@@ -227,6 +227,25 @@ TEST_F(Safety, AFingerThatIsPressedBeforehandIsNamed) {
   ExpectEveryResultIsItsOwnTouch();
 }
 
+TEST_F(Safety, AFingerThatSticksInMidApproachIsNamedAndItsTouchIsRefused) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  ASSERT_TRUE(Touch(lease.token(), FromAbove(), "good").status.ok());
+  auto answer = TouchLater(lease.token(), FromAbove(0.02, 1), "sticks");
+  WaitUntilApproaching();
+  emulator_->faults().Set("stuck_finger", 1);
+  const grpc::Status refused = answer.get().status;
+  EXPECT_EQ(refused.error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(refused.error_message(), HasSubstr("finger 2 is still pressed although the tool is back"));
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE);
+  emulator_->faults().Set("stuck_finger", -1);
+  ExpectTheTouchCanBeMade(FromAbove(0.02, 1), "sticks");
+  StopGateway();
+  for (const session::JournalTouch& touch : Journalled())
+    EXPECT_EQ(touch.stage, session::TouchStage::kDone) << touch.id << ": " << touch.error;
+}
+
 TEST_F(Safety, AFingerThatStaysSilentEndsTheApproachBeforeTheOthersArePushedTooFar) {
   StartRig();
   StartGateway();

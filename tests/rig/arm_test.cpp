@@ -16,6 +16,7 @@
 namespace touchstone {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;  // host time; the machine may be busy
@@ -373,6 +374,21 @@ TEST_F(EmulatedArm, ClockOfTheControllerIsToldInHostTime) {
   const gateway::arm::ArmState state = *arm_->State();
   const double told_s = arm_->ControllerClock().RemoteOf(state.host_time_s);
   EXPECT_NEAR(told_s, state.controller_time_s, 1.0) << "not later than a busy machine delivers it";
+}
+
+// UR, RTDE guide (article 22229): registers 24 to 47 came with 5.3.0 and 3.9.0; before, they are NOT_FOUND.
+TEST_F(EmulatedArm, SoftwareWithoutItsRegistersIsNamedWithItsVersionAndWhatWouldBeRight) {
+  arm_ = nullptr;
+  faults_.Set("old_software", 1);
+  arm_options_.connect_wait_s = 0.5;
+  arm_ = gateway::arm::ConnectUrArm(arm_options_, &changes_).value();
+  EXPECT_TRUE(Wait([&] { return absl::IsFailedPrecondition(arm_->State().status()); }))
+      << arm_->State().status();
+  EXPECT_THAT(std::string(arm_->State().status().message()),
+              AllOf(HasSubstr("output_int_register_24: NOT_FOUND"), HasSubstr("5.3.0 (e-Series): update"),
+                    HasSubstr("its software is 5.2.0.61336")));
+  faults_.Set("old_software", 0);
+  EXPECT_TRUE(Wait([&] { return arm_->State().ok(); })) << "connects again by itself";
 }
 
 TEST(UrArm, PowersOnAndReleasesTheBrakes) {

@@ -12,7 +12,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/image/whole_picture.h"
 #include "server/session/camera_yaml.h"
+#include "server/session/image_set_file.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
@@ -97,8 +100,12 @@ absl::StatusOr<BoardSet> ReadBoardPictures(const std::string& folder, const Boar
   set.board = board;
   set.camera_is_guess = true;
   for (const fs::path& file : files) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(file.string(), session::kMaxPictureBytes));
+    if (const absl::Status whole = image::CheckWholePicture(bytes); !whole.ok())
+      return absl::Status(whole.code(), absl::StrCat(file.string(), ": cannot be read: ", whole.message()));
     try {
-      const cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+      const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+      const cv::Mat grey = cv::imdecode(coded, cv::IMREAD_GRAYSCALE);
       if (grey.empty() || std::max(grey.cols, grey.rows) > kMaxSide)
         return absl::InvalidArgumentError(
             absl::StrCat(file.string(), ": cannot be read as a picture of at most ", kMaxSide, " px a side"));

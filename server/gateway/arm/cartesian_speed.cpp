@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone::gateway::arm {
@@ -37,10 +38,10 @@ double LimitedCartesianSpeed(const UrKinematics& kinematics, const ArmBody& body
                              const Eigen::Isometry3d& to, double speed_m_s, Joints* joints) {
   const double line_speed_m_s = LineSpeed(from, to, speed_m_s);
   const Eigen::Vector3d line_m = to.translation() - from.translation();
-  const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
+  const double turn_rad = TurnRad(from, to);
   const int steps =
-      std::max(1, static_cast<int>(std::ceil(std::max(line_m.norm() / kStepM, turn.angle() / kStepRad))));
-  const double step_s = std::max(line_m.norm() / line_speed_m_s, turn.angle() / kMaxTurnRadS) / steps;
+      std::max(1, static_cast<int>(std::ceil(std::max(line_m.norm() / kStepM, turn_rad / kStepRad))));
+  const double step_s = std::max(line_m.norm() / line_speed_m_s, turn_rad / kMaxTurnRadS) / steps;
   double slower = 1;
   BodyPoints points = body.At(kinematics, *joints);
   for (int step = 1; step <= steps; ++step) {

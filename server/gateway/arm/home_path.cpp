@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/status.h"
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/transit.h"
 
 namespace touchstone::gateway::arm {
@@ -63,8 +64,9 @@ class HomeSearch {
   // From a pose above the plane.
   bool Across(const Eigen::Isometry3d& out, const Joints& above, HomePath* path) {
     Joints joints = above;
-    if (Follow(out, {home_}, kAcrossWhat, &joints) && Turn(joints, {limits_.home_rad}, path)) {
-      path->poses.push_back(home_);
+    const std::vector<Eigen::Isometry3d> across = SplitTurns(out, {home_});
+    if (Follow(out, across, kAcrossWhat, &joints) && Turn(joints, {limits_.home_rad}, path)) {
+      path->poses.insert(path->poses.end(), across.begin(), across.end());
       return true;
     }
     if (Turn(above, {limits_.home_rad}, path)) return true;

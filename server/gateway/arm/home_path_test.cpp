@@ -8,6 +8,7 @@
 
 #include "server/base/test_tier.h"
 #include "server/base/units.h"
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/motion_planner.h"
 
 namespace touchstone::gateway::arm {
@@ -61,6 +62,7 @@ void Try(const Bench& bench, const ArmState& from, const std::string& where, Tal
   Eigen::Isometry3d at = from.base_from_tip;
   int beyond = 0;
   for (const Eigen::Isometry3d& pose : path->poses) {
+    ASSERT_LE(TurnRad(at, pose), kMaxLineTurnRad + 1e-5) << where;
     const absl::Status followed = bench.check->Follow(at, pose, 0.15, true, where, &joints, &beyond);
     ASSERT_TRUE(followed.ok()) << followed;
     at = pose;

@@ -10,6 +10,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/cartesian_speed.h"
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/ur_script.h"
 
 namespace touchstone::gateway::arm {
@@ -131,12 +132,13 @@ absl::Status LineCheck::Follow(const Eigen::Isometry3d& from, const Eigen::Isome
   // An end that cannot be reached is reported as such, not as the stretched elbow on the path to it.
   TOUCHSTONE_RETURN_IF_ERROR(CheckTips(to, what));
   if (Joints unused; !JointsAt(to, *joints, &unused)) return OutOfReach(to, what);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckLineTurn(from, to, what));
   const Eigen::Vector3d line_m = to.translation() - from.translation();
-  const Eigen::AngleAxisd turn(from.linear().transpose() * to.linear());
+  const double turn_rad = TurnRad(from, to);
   const int steps = std::max(
-      1, static_cast<int>(std::ceil(std::max(line_m.norm() / kCheckStepM, turn.angle() / kCheckStepRad))));
+      1, static_cast<int>(std::ceil(std::max(line_m.norm() / kCheckStepM, turn_rad / kCheckStepRad))));
   const double step_s =
-      std::max(line_m.norm() / LineSpeed(from, to, speed_m_s), turn.angle() / kMaxTurnRadS) / steps;
+      std::max(line_m.norm() / LineSpeed(from, to, speed_m_s), turn_rad / kMaxTurnRadS) / steps;
   const double max_slowing = may_slow ? kMaxSlowing : 1;
   BodyPoints points = body_.At(kinematics_, *joints);
   for (int step = 0; step <= steps; ++step) {

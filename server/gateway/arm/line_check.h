@@ -30,7 +30,7 @@ class LineCheck {
   Eigen::Isometry3d TipAt(const Joints& joints) const;
 
   // Follows the line at `speed_m_s`, beginning with *joints, which become those of the end. `what` names the
-  // line in messages ("the approach"). OUT_OF_RANGE with value and limit. Where `may_slow`, the arm goes
+  // line in messages ("the approach"). OUT_OF_RANGE with value and limit; also for a turn beyond kMaxLineTurnRad. Where `may_slow`, the arm goes
   // slower where its joints or its body demand it (LimitedCartesianSpeed), down to a tenth. *wrist_3_beyond is +1 or -1
   // if only wrist 3 would turn beyond its upper or lower limit; else 0. `watch`, unless null, sees every sample.
   absl::Status Follow(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double speed_m_s,

@@ -177,12 +177,20 @@ absl::StatusOr<std::vector<Eigen::Isometry3d>> UrMotionPlanner::Transit(
   // Near its limit it would be stuck: the approach and the next retract turn it a little, too.
   if (end.ok() && (*end)[5] > limits_.joint_max_rad[5] - kWristReserveRad) beyond = 1;
   if (end.ok() && (*end)[5] < limits_.joint_min_rad[5] + kWristReserveRad) beyond = -1;
-  if (beyond != 0) {
-    // Wrist 3 would wind the cable up: the tool turns in the other direction.
-    const std::vector<Eigen::Isometry3d> unwinding = path.Poses(-beyond);
+  // The tool turns in the other direction where wrist 3 would wind the cable up, and, whichever that is, where the arm
+  // cannot follow.
+  std::vector<int> others;
+  if (beyond != 0)
+    others = {-beyond};
+  else if (!end.ok())
+    others = {1, -1};
+  for (const int turn : others) {
+    const std::vector<Eigen::Isometry3d> turned = path.Poses(turn);
     SingularityWatch seen_then;
-    absl::StatusOr<Joints> other = FollowAll(check, from.base_from_tip, unwinding, here, &beyond, &seen_then);
-    if (other.ok()) poses = unwinding, end = other, seen = seen_then;
+    absl::StatusOr<Joints> other = FollowAll(check, from.base_from_tip, turned, here, &beyond, &seen_then);
+    if (!other.ok()) continue;
+    poses = turned, end = other, seen = seen_then;
+    break;
   }
   TOUCHSTONE_RETURN_IF_ERROR(end.status());
   *watch = seen;

@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/gateway/arm/line_check.h"
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/transit.h"
 #include "server/gateway/arm/ur_script.h"
 
@@ -133,6 +134,29 @@ TEST(MotionPlanner, TransitsCrossAboveTheObject) {
         EXPECT_GT((path[line].translation() + part * along).z(), 0.175 + 0.05 - 1e-6) << "touch " << i;
     }
     rig.Make(*plan);
+  }
+}
+
+// A controller that goes the other way round on a line of half a turn goes where nothing was checked.
+TEST(MotionPlanner, NoLineOfATransitTurnsTheToolNearlyHalfWayRound) {
+  for (const std::string model : {"ur3", "ur3e"}) {
+    Rig rig(model);
+    touch::CommandedTouch touch = FromAbove();
+    for (const double roll_deg : {0.0, 180.0, 1.0, 180.5, 359.0, 90.0, 269.99, 30.0}) {
+      const double roll_rad = roll_deg * kRadiansPerDegree;
+      touch.lateral = Eigen::Vector3d(std::cos(roll_rad), std::sin(roll_rad), 0);
+      const auto plan = rig.Plan(touch);
+      ASSERT_TRUE(plan.ok()) << model << ", roll " << roll_deg << ": " << plan.status();
+      Eigen::Isometry3d from = rig.at.base_from_tip;
+      double turned_rad = 0;
+      for (const Eigen::Isometry3d& pose : plan->motion.transit) {
+        EXPECT_LE(TurnRad(from, pose), kMaxLineTurnRad + 1e-5) << model << ", roll " << roll_deg;
+        turned_rad += TurnRad(from, pose);
+        from = pose;
+      }
+      EXPECT_GE(turned_rad, TurnRad(rig.at.base_from_tip, from) - 1e-9);
+      rig.Make(*plan);
+    }
   }
 }
 

@@ -131,7 +131,9 @@ absl::Status RtdeClient::Negotiate(TcpSocket* socket) {
     with_tcp_offset_ = false;
     recipe = outputs();
   }
-  TOUCHSTONE_RETURN_IF_ERROR(recipe.status());
+  if (!recipe.ok())
+    return absl::Status(recipe.status().code(),
+                        absl::StrCat(recipe.status().message(), "; its software is ", version));
   output_recipe_ = *recipe;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string input_reply,
                               Ask(socket, RtdeType::kInputs, RtdeInputNames()));

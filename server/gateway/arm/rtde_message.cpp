@@ -67,8 +67,13 @@ absl::StatusOr<uint8_t> ParseRecipe(absl::string_view payload, const std::vector
           absl::StrCat(fields[i].name, ": ", types[i].substr(0, 32), " instead of ", fields[i].type));
   }
   if (wrong.empty() && recipe != 0) return recipe;
-  const std::string hint =
+  std::string hint =
       absl::StrContains(text, "IN_USE") ? "; another RTDE client writes these registers: end it" : "";
+  // UR, RTDE guide (article 22229): integer registers 24 to 47 from 3.9.0 and 5.3.0.
+  for (const std::string& each : wrong)
+    if (absl::StrContains(each, "_int_register_") && absl::StrContains(each, "NOT_FOUND"))
+      hint =
+          "; registers 24 to 47 came with PolyScope 3.9.0 (CB3) and 5.3.0 (e-Series): update the controller";
   return absl::FailedPreconditionError(
       absl::StrCat("RTDE: the controller refuses the recipe (", absl::StrJoin(wrong, ", "), ")", hint));
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/gateway/arm/line_turn.h"
 
 namespace touchstone::gateway::arm {
 namespace {
@@ -12,8 +13,7 @@ constexpr double kSamePlaceM = 1e-4, kSameTurnRad = 1e-3;
 constexpr double kLevel = 0.3;  // a tool whose axis falls less than this goes straight up instead
 
 bool SamePose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  return (a.translation() - b.translation()).norm() < kSamePlaceM &&
-         Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle() < kSameTurnRad;
+  return (a.translation() - b.translation()).norm() < kSamePlaceM && TurnRad(a, b) < kSameTurnRad;
 }
 
 // The pose lifted to the plane, along its own axis.
@@ -66,7 +66,7 @@ std::vector<Eigen::Isometry3d> TransitPath::Poses(int turn) const {
     if (!kept.empty() && SamePose(kept.back(), to)) kept.pop_back();
     kept.push_back(to);
   }
-  return kept;
+  return SplitTurns(from, kept);
 }
 
 std::vector<Eigen::Isometry3d> RetractPath(const Eigen::Isometry3d& from, double back_m, double height_m) {

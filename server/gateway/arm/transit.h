@@ -13,7 +13,7 @@ struct TransitPath {
   double plane_m = 0;             // height, base frame, that every fingertip crosses at, at least
   double outermost_finger_m = 0;  // from the middle one
 
-  // Poses to go through in straight lines; the last is `to`. turn = 0: the tool turns in the shorter direction about
+  // Poses to go through in straight lines (line_turn.h); the last is `to`. turn = 0: the tool turns in the shorter direction about
   // its axis; +1 or -1: counter-clockwise or clockwise about its z, even if that is the longer turn.
   std::vector<Eigen::Isometry3d> Poses(int turn) const;
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/gateway/arm/line_turn.h"
 #include "server/gateway/arm/registers.h"
 #include "server/geometry/pose.h"
 
@@ -67,10 +68,6 @@ std::string Lines(const std::vector<Eigen::Isometry3d>& poses, const std::vector
   for (size_t i = 0; i < poses.size(); ++i)
     absl::StrAppend(&text, "  ", MoveLine(poses[i], options.acceleration_m_s2, speeds_m_s[i]));
   return text;
-}
-
-double TurnRad(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
-  return Eigen::AngleAxisd(from.linear().transpose() * to.linear()).angle();
 }
 
 }  // namespace

@@ -4,15 +4,25 @@
 #include <cstdlib>
 #include <utility>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "server/base/check.h"
+#include "server/base/status.h"
 #include "server/gateway/camera/camera_kinds.h"
+#include "server/image/whole_picture.h"
 
 namespace touchstone::gateway::camera {
+namespace {
+
+constexpr double kMaxLatencyS = 10;
+
+}  // namespace
 
 void QuietOpenCv() {
   static const bool quiet = [] {
@@ -37,6 +47,29 @@ image::Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number
   return frame;
 }
 
+absl::StatusOr<cv::Mat> DecodeWhole(absl::string_view bytes) {
+  TOUCHSTONE_RETURN_IF_ERROR(image::CheckWholePicture(bytes));
+  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+  cv::Mat picture;
+  try {
+    picture = cv::imdecode(coded, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+  }
+  if (picture.empty()) return absl::InvalidArgumentError("cannot be decoded; the picture is damaged");
+  return picture;
+}
+
+bool TakesJpegsAsTheyCame(cv::VideoCapture* stream) {
+  // V4L2 says MJPG, FFmpeg the name of its decoder.
+  const uint32_t code = static_cast<uint32_t>(stream->get(cv::CAP_PROP_FOURCC));
+  std::string name;
+  for (int shift = 0; shift < 32; shift += 8)
+    name += absl::ascii_tolower(static_cast<unsigned char>(code >> shift & 0xFF));
+  if (name != "mjpg" && name != "mjpe" && name != "jpeg") return false;
+  return stream->getBackendName() == "FFMPEG" ? stream->set(cv::CAP_PROP_FORMAT, -1)
+                                              : stream->set(cv::CAP_PROP_CONVERT_RGB, 0);
+}
+
 absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOptions& options) {
   QuietOpenCv();
   const CameraKind kind = CameraKindOf(options.uri);
@@ -46,6 +79,9 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> CameraDevice::Open(const CameraOpt
   if (!(options.timeout_s > 0 && std::isfinite(options.timeout_s)))
     return absl::InvalidArgumentError(
         absl::StrCat("camera: timeout_s is ", options.timeout_s, "; right is above 0"));
+  if (!(options.latency_s >= 0 && options.latency_s <= kMaxLatencyS))
+    return absl::InvalidArgumentError(
+        absl::StrCat("camera: latency_s is ", options.latency_s, "; right is from 0 to ", kMaxLatencyS));
   if (options.width < 0 || options.height < 0)
     return absl::InvalidArgumentError(absl::StrCat("camera: size ", options.width, " x ", options.height,
                                                    "; right is above 0, or 0 as it comes"));

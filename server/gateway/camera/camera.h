@@ -33,6 +33,7 @@ struct CameraOptions {
   std::string intrinsics;     // file; empty: the field of view below, no distortion
   double vertical_fov_rad = 0.7853981633974483;
   double timeout_s = 2;
+  double latency_s = 0;  // from the exposure of a picture until it is here (stream, UVC) or written (folder)
   const Clock* clock = &timing::HostClock();  // outlives the camera
 };
 
@@ -41,8 +42,9 @@ class CameraDevice {
   static absl::StatusOr<std::unique_ptr<CameraDevice>> Open(const CameraOptions& options);
   virtual ~CameraDevice() = default;
 
-  // A picture that was exposed after `after_host_s`: older ones in the driver's queue are thrown away.
-  // UNAVAILABLE if none comes in time, DATA_LOSS if the camera repeats one picture bit by bit (frozen).
+  // A picture that was exposed after `after_host_s`: older ones in the driver's queue, and those that come before
+  // latency_s has passed, are thrown away. UNAVAILABLE if none comes in time, DATA_LOSS if the camera repeats one picture
+  // bit by bit (frozen) or sends none that is whole.
   virtual absl::StatusOr<image::Frame> Take(double after_host_s) = 0;
   virtual CameraKind kind() const = 0;
   virtual std::string Description() const = 0;

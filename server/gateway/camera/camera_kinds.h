@@ -4,13 +4,16 @@
 #include <memory>
 #include <string>
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
 
 #include "server/gateway/camera/camera.h"
 
 namespace cv {
 class Mat;
-}
+class VideoCapture;
+}  // namespace cv
 
 namespace touchstone::gateway::camera {
 
@@ -20,11 +23,11 @@ class PictureStream {
  public:
   virtual ~PictureStream() = default;
   // Also again, after it broke.
-  virtual bool Open() = 0;
+  virtual absl::Status Open() = 0;
   // Waits for the next picture; false if the stream broke.
   virtual bool Grab() = 0;
-  // What was grabbed last; false if it cannot be decoded.
-  virtual bool Retrieve(cv::Mat* picture) = 0;
+  // What was grabbed last. DATA_LOSS: it is not whole; the next one may be.
+  virtual absl::Status Retrieve(cv::Mat* picture) = 0;
 };
 
 // A camera that delivers frames all the time: UVC, or pictures over HTTP. Opened again when it was unplugged.
@@ -46,6 +49,13 @@ absl::StatusOr<std::unique_ptr<CameraDevice>> OpenVideoCamera(const CameraOption
 
 // Of a picture in OpenCV's order (blue first) or grey.
 image::Frame FrameOf(const cv::Mat& picture, double host_time_s, uint64_t number);
+// Of a file's bytes, in OpenCV's order. INVALID_ARGUMENT: it is not whole (image::CheckWholePicture), or no picture.
+absl::StatusOr<cv::Mat> DecodeWhole(absl::string_view bytes);
+
+// Whether what was just opened sends JPEG pictures. If so it hands them over as they came from now on, one row of bytes
+// each: decoded by FFmpeg, a picture that is cut off looks like a whole one.
+bool TakesJpegsAsTheyCame(cv::VideoCapture* stream);
+
 // OpenCV writes nothing to stderr from now on; its errors come back as exceptions, which are caught here.
 void QuietOpenCv();
 

@@ -51,10 +51,13 @@ class CameraTest : public testing::Test {
   void WriteAt(const std::string& name, int grey, double unix_s) const {
     const std::string part = folder_ + "/.written.png", path = folder_ + "/" + name;
     cv::imwrite(part, cv::Mat(12, 16, CV_8UC3, cv::Scalar(grey, grey, grey)));
+    Stamp(part, unix_s);
+    std::filesystem::rename(part, path);
+  }
+  static void Stamp(const std::string& path, double unix_s) {
     timespec times[2];
     times[0] = times[1] = {static_cast<time_t>(unix_s), std::lround(1e9 * (unix_s - std::floor(unix_s)))};
-    ASSERT_EQ(utimensat(AT_FDCWD, part.c_str(), times, 0), 0);
-    std::filesystem::rename(part, path);
+    ASSERT_EQ(utimensat(AT_FDCWD, path.c_str(), times, 0), 0);
   }
   // Why it gives none, once its time is over.
   absl::Status TakeInVain(CameraDevice* camera, double after_host_s) {
@@ -163,6 +166,25 @@ TEST_F(CameraTest, TakesNoPictureWhoseAgeAClockHides) {
   EXPECT_EQ(frame->rgb.at(0), 50);
 }
 
+// OpenCV fills what is missing of a JPEG with grey.
+TEST_F(CameraTest, TakesNoPictureOfAFolderThatIsNotWhole) {
+  const auto camera = Open(AtClock(Options("folder:" + folder_)));
+  ASSERT_NE(camera, nullptr);
+  for (const std::string name : {"a.jpg", "b.png", "c.bmp", "d.ppm", "e.tiff"}) {
+    const std::string path = folder_ + "/" + name;
+    cv::Mat noise(48, 64, CV_8UC3);
+    cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 255);
+    cv::imwrite(path, noise);
+    Stamp(path, clock_.UnixNowS());
+    EXPECT_TRUE(camera->Take(clock_.NowS()).ok()) << name;
+    std::filesystem::resize_file(path, std::filesystem::file_size(path) * 6 / 10);
+    Stamp(path, clock_.UnixNowS());
+    const absl::Status cut = TakeInVain(camera.get(), clock_.NowS());
+    EXPECT_TRUE(absl::IsUnavailable(cut)) << name << ": " << cut;
+    EXPECT_THAT(std::string(cut.message()), HasSubstr(name + " cannot be read: ")) << name;
+  }
+}
+
 TEST_F(CameraTest, PlaysAVideoAndBeginsItAnew) {
   const std::string path = folder_ + "/film.avi";
   {
@@ -255,6 +277,55 @@ TEST_F(StreamCameraTest, TakesNoneThatStoodInAQueue) {
   EXPECT_EQ(taking.get()->rgb.at(0), 60);
 }
 
+TEST_F(StreamCameraTest, PassesOverDamagedPicturesAndSaysSoWhereNoneIsWhole) {
+  Taking taking = Take(clock_.NowS());
+  clock_.Advance(kPeriodS);
+  cable_.ShowDamaged();
+  ShowNext(10);
+  absl::StatusOr<image::Frame> frame = taking.get();
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->rgb.at(0), 10);
+  taking = Take(clock_.NowS());
+  for (int i = 0; i < 3; ++i) {
+    cable_.AwaitGrab();
+    clock_.Advance(kPeriodS);
+    cable_.ShowDamaged();
+  }
+  cable_.AwaitGrab();
+  clock_.Advance(kTimeoutS);
+  frame = taking.get();
+  EXPECT_TRUE(absl::IsDataLoss(frame.status())) << frame.status();
+  EXPECT_THAT(
+      std::string(frame.status().message()),
+      HasSubstr("no whole picture in 2 s; 3 that came were refused, the last one: JPEG: no end marker"));
+}
+
+TEST_F(StreamCameraTest, TakesNoPictureThatWasExposedBeforeAndCameLate) {
+  CameraOptions options = AtClock(Options("/dev/video0", kTimeoutS));
+  options.latency_s = 0.3;
+  FakeCable cable;
+  const auto camera = *OpenStreamCamera(options, cable.Stream());
+  const auto show_next = [&](int grey) {
+    cable.AwaitGrab();
+    clock_.Advance(kPeriodS);
+    cable.Show(grey);
+    cable.AwaitGrab();
+  };
+  show_next(1);
+  const double after_s = clock_.NowS();
+  Taking taking = std::async(std::launch::async, [&] { return camera->Take(after_s); });
+  clock_.AwaitWaiters();
+  int grey = 10;
+  for (; clock_.NowS() < after_s + options.latency_s; ++grey) show_next(grey);
+  EXPECT_FALSE(Over(taking));
+  show_next(grey);
+  const absl::StatusOr<image::Frame> frame = taking.get();
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->rgb.at(0), grey);
+  EXPECT_GE(frame->host_time_s, after_s) << "the time is that of the exposure";
+  cable.Cut();
+}
+
 TEST_F(StreamCameraTest, NoticesAFrozenCamera) {
   ShowNext(7);
   EXPECT_EQ(camera_->stale_frames(), 0u);
@@ -314,6 +385,17 @@ TEST_F(CameraTest, TakesPicturesOverHttp) {
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_EQ(SceneOf(*frame), 5);
   EXPECT_GE(frame->host_time_s, after_s);
+}
+
+// OpenCV and FFmpeg fill what is missing of a JPEG with grey.
+TEST_F(CameraTest, TakesNoPictureOverHttpThatIsCutOff) {
+  MjpegServer server;
+  const auto camera = Open(Options(server.Url(), 0.4));
+  ASSERT_NE(camera, nullptr);
+  server.share = 0.6;
+  const absl::Status cut = camera->Take(timing::HostNowS() + 0.1).status();
+  EXPECT_TRUE(absl::IsDataLoss(cut)) << cut;
+  EXPECT_THAT(std::string(cut.message()), HasSubstr("JPEG: no end marker (EOI)"));
 }
 
 class CameraOverHttpTest : public CameraTest {

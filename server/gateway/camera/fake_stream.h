@@ -27,6 +27,8 @@ class FakeCable {
     state_->queue.push_back(grey);
     state_->changed.notify_all();
   }
+  // A picture comes of which a part is missing.
+  void ShowDamaged() { Show(kDamaged); }
   // Until the camera waits for a picture: it has dealt with all that were shown.
   void AwaitGrab() const {
     std::unique_lock<std::mutex> lock(state_->mutex);
@@ -37,6 +39,7 @@ class FakeCable {
   void Plug() { SetPlugged(true); }
 
  private:
+  static constexpr int kDamaged = -1;
   struct State {
     std::mutex mutex;
     std::condition_variable changed;
@@ -47,9 +50,9 @@ class FakeCable {
   class End final : public PictureStream {
    public:
     explicit End(std::shared_ptr<State> state) : state_(std::move(state)) {}
-    bool Open() override {
+    absl::Status Open() override {
       std::lock_guard<std::mutex> lock(state_->mutex);
-      return state_->plugged;
+      return state_->plugged ? absl::OkStatus() : absl::UnavailableError("the cable is cut");
     }
     bool Grab() override {
       std::unique_lock<std::mutex> lock(state_->mutex);
@@ -62,9 +65,10 @@ class FakeCable {
       state_->queue.pop_front();
       return true;
     }
-    bool Retrieve(cv::Mat* picture) override {
+    absl::Status Retrieve(cv::Mat* picture) override {
+      if (grey_ == kDamaged) return absl::DataLossError("JPEG: no end marker (EOI)");
       *picture = cv::Mat(12, 16, CV_8UC3, cv::Scalar(grey_, grey_, grey_));
-      return true;
+      return absl::OkStatus();
     }
 
    private:

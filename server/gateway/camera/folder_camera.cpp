@@ -6,8 +6,8 @@
 #include <absl/strings/str_cat.h>
 #include <sys/stat.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
+#include "server/base/text.h"
 #include "server/gateway/camera/camera_kinds.h"
 
 namespace touchstone::gateway::camera {
@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kCoarseS = 0.01;  // file systems stamp with the kernel's slow clock
 constexpr double kLookS = 0.02;
+constexpr uint64_t kMaxFileBytes = uint64_t{256} << 20;
 
 bool IsPicture(const std::filesystem::path& path) {
   if (path.filename().string().front() == '.') return false;
@@ -45,7 +46,7 @@ class FolderCamera : public CameraDevice {
   absl::StatusOr<image::Frame> Take(double after_host_s) override {
     std::lock_guard<std::mutex> lock(mutex_);
     const Clock& clock = *options_.clock;
-    const double until_s = clock.NowS() + options_.timeout_s;
+    const double until_s = clock.NowS() + options_.timeout_s + options_.latency_s;
     while (true) {
       const std::string name = Newest();
       std::string why = "it has no picture";
@@ -58,17 +59,15 @@ class FolderCamera : public CameraDevice {
               "its newest picture, ", std::filesystem::path(name).filename().string(),
               ", was written at a time that had not come yet: a clock was set back, or the folder's is "
               "ahead, so how old it is cannot be known");
-        } else if (changed_s + kCoarseS < after_host_s) {
+        } else if (changed_s + kCoarseS < after_host_s + options_.latency_s) {
           why = absl::StrCat("its newest picture, ", std::filesystem::path(name).filename().string(),
                              ", is older than asked for");
         } else {
-          cv::Mat picture;
-          try {
-            picture = cv::imread(name, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-          } catch (const cv::Exception&) {
-          }
-          if (!picture.empty()) return FrameOf(picture, changed_s, ++frames_);
-          why = absl::StrCat(std::filesystem::path(name).filename().string(), " cannot be read");
+          const absl::StatusOr<std::string> bytes = ReadFile(name, kMaxFileBytes);
+          const absl::StatusOr<cv::Mat> picture = bytes.ok() ? DecodeWhole(*bytes) : bytes.status();
+          if (picture.ok()) return FrameOf(*picture, changed_s - options_.latency_s, ++frames_);
+          why = absl::StrCat(std::filesystem::path(name).filename().string(),
+                             " cannot be read: ", picture.status().message());
         }
       }
       if (clock.NowS() >= until_s)

@@ -92,6 +92,7 @@ void MjpegServer::Serve(int client) {
       cv::imencode(".jpg", picture, jpeg);
     }
     if (!silent) {
+      jpeg.resize(static_cast<size_t>(share * static_cast<double>(jpeg.size())));
       const std::string part =
           "--next\r\nContent-Type: image/jpeg\r\nContent-Length: " + std::to_string(jpeg.size()) + "\r\n\r\n";
       if (!SendAll(client, part.data(), part.size()) || !SendAll(client, jpeg.data(), jpeg.size()) ||

@@ -19,6 +19,7 @@ class MjpegServer {
   std::atomic<int> scene{0};        // 0 to 7: where the square is
   std::atomic<bool> frozen{false};  // sends one picture again and again
   std::atomic<bool> silent{false};  // sends nothing
+  std::atomic<double> share{1};     // of every picture's bytes that is sent
   static int SceneOf(const uint8_t* rgb, int width, int height);
 
  private:

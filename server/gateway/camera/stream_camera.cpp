@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "server/base/status.h"
 #include "server/gateway/camera/camera_kinds.h"
 
 namespace touchstone::gateway::camera {
@@ -30,7 +31,39 @@ class OpenCvStream final : public PictureStream {
  public:
   explicit OpenCvStream(CameraOptions options) : options_(std::move(options)) {}
 
-  bool Open() override {
+  absl::Status Open() override {
+    if (!OpenDevice())
+      return absl::UnavailableError(
+          absl::StrCat("camera: ", options_.uri,
+                       " cannot be opened; is it there, is it a camera, and does nobody else use it?"));
+    jpegs_ = TakesJpegsAsTheyCame(&stream_);
+    // What a UVC camera sends uncompressed is whole: the driver drops a picture of which bytes are missing (uvcvideo,
+    // parameter nodrop). In other codecs what is missing is filled in from older pictures.
+    if (!jpegs_ && CameraKindOf(options_.uri) == CameraKind::kStream)
+      return absl::FailedPreconditionError(
+          absl::StrCat("camera: ", options_.uri,
+                       " does not send JPEG pictures one by one (MJPEG), so that "
+                       "nobody could tell whether one is whole; set the camera to MJPEG"));
+    return absl::OkStatus();
+  }
+  bool Grab() override { return stream_.grab(); }
+  absl::Status Retrieve(cv::Mat* picture) override {
+    cv::Mat taken;
+    if (!stream_.retrieve(taken) || taken.empty()) return absl::DataLossError("it cannot be decoded");
+    if (!jpegs_) {
+      *picture = taken;
+      return absl::OkStatus();
+    }
+    if (!taken.isContinuous()) taken = taken.clone();
+    absl::StatusOr<cv::Mat> decoded = DecodeWhole(
+        absl::string_view(reinterpret_cast<const char*>(taken.data), taken.total() * taken.elemSize()));
+    if (!decoded.ok()) return absl::DataLossError(decoded.status().message());
+    *picture = *std::move(decoded);
+    return absl::OkStatus();
+  }
+
+ private:
+  bool OpenDevice() {
     try {
       stream_.release();
       const std::string& uri = options_.uri;
@@ -51,12 +84,10 @@ class OpenCvStream final : public PictureStream {
       return false;
     }
   }
-  bool Grab() override { return stream_.grab(); }
-  bool Retrieve(cv::Mat* picture) override { return stream_.retrieve(*picture) && !picture->empty(); }
 
- private:
   const CameraOptions options_;
   cv::VideoCapture stream_;
+  bool jpegs_ = false;
 };
 
 class StreamCamera : public CameraDevice {
@@ -73,10 +104,7 @@ class StreamCamera : public CameraDevice {
   }
 
   absl::Status Start() {
-    if (!stream_->Open())
-      return absl::UnavailableError(
-          absl::StrCat("camera: ", options_.uri,
-                       " cannot be opened; is it there, is it a camera, and does nobody else use it?"));
+    TOUCHSTONE_RETURN_IF_ERROR(stream_->Open());
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
   }
@@ -85,18 +113,23 @@ class StreamCamera : public CameraDevice {
     std::lock_guard<std::mutex> one(take_mutex_);
     std::unique_lock<std::mutex> lock(mutex_);
     wanted_ = true;
-    wanted_after_s_ = after_host_s;
+    wanted_after_s_ = after_host_s + options_.latency_s;
     repeated_ = false;
     has_result_ = false;
+    damaged_ = 0;
     // Of what is asked for ahead of time, the time until then does not count.
     const double patience_s =
-        options_.timeout_s + std::clamp(after_host_s - options_.clock->NowS(), 0.0, 60.0);
+        options_.timeout_s + std::clamp(wanted_after_s_ - options_.clock->NowS(), 0.0, 60.0);
     options_.clock->WaitFor(lock, changed_, patience_s, [this] { return has_result_; });
     wanted_ = false;
     if (has_result_) return std::move(result_);
     if (repeated_)
       return absl::DataLossError(absl::StrCat(
           "camera ", options_.uri, " repeats one picture bit by bit: it is frozen; plug it in anew"));
+    if (damaged_ > 0)
+      return absl::DataLossError(absl::StrCat("camera ", options_.uri, ": no whole picture in ",
+                                              options_.timeout_s, " s; ", damaged_,
+                                              " that came were refused, the last one: ", damage_));
     return absl::UnavailableError(absl::StrCat("camera ", options_.uri, ": no picture in ",
                                                options_.timeout_s, " s", why_.empty() ? "" : ": ", why_));
   }
@@ -124,7 +157,7 @@ class StreamCamera : public CameraDevice {
           if (stopping_) return;
         }
       }
-      if (!open) open = stream_->Open();
+      if (!open) open = stream_->Open().ok();
       if (open) open = Next();
       if (!open) {
         std::lock_guard<std::mutex> lock(mutex_);
@@ -152,7 +185,12 @@ class StreamCamera : public CameraDevice {
       }
       cv::Mat picture;
       if (!decode) return true;
-      if (!stream_->Retrieve(&picture)) return false;
+      if (const absl::Status whole = stream_->Retrieve(&picture); !whole.ok()) {
+        std::lock_guard<std::mutex> lock(mutex_);
+        ++damaged_;
+        damage_ = std::string(whole.message());
+        return true;
+      }
       const bool first = last_.empty();
       const bool same = !first && picture.size() == last_.size() && picture.type() == last_.type() &&
                         picture.isContinuous() &&
@@ -163,7 +201,7 @@ class StreamCamera : public CameraDevice {
         ++stale_frames_;
         repeated_ = true;
       } else if (!first && wanted_ && !has_result_ && began_s >= wanted_after_s_) {
-        result_ = FrameOf(picture, came_s, frames_);
+        result_ = FrameOf(picture, came_s - options_.latency_s, frames_);
         has_result_ = true;
         lock.unlock();
         changed_.notify_all();
@@ -187,6 +225,8 @@ class StreamCamera : public CameraDevice {
   double wanted_after_s_ = 0;
   image::Frame result_;
   std::string why_;
+  int damaged_ = 0;     // pictures that were not whole, since somebody waits
+  std::string damage_;  // of the last one
   uint64_t frames_ = 0, stale_frames_ = 0;
 };
 

@@ -16,7 +16,7 @@ class VideoCamera : public CameraDevice {
 
   absl::Status Start() {
     try {
-      if (video_.open(path_)) return absl::OkStatus();
+      if (Open()) return absl::OkStatus();
     } catch (const cv::Exception&) {
     }
     return absl::InvalidArgumentError(absl::StrCat("camera: ", path_, " is no video that OpenCV can read"));
@@ -28,8 +28,16 @@ class VideoCamera : public CameraDevice {
       if (!video_.read(picture)) {
         // Opened again rather than wound back, which not every container can.
         video_.release();
-        if (!video_.open(path_) || !video_.read(picture))
+        if (!Open() || !video_.read(picture))
           return absl::UnavailableError(absl::StrCat("camera: video ", path_, " cannot be read any more"));
+      }
+      if (jpegs_) {
+        const absl::StatusOr<cv::Mat> decoded = DecodeWhole(absl::string_view(
+            reinterpret_cast<const char*>(picture.data), picture.total() * picture.elemSize()));
+        if (!decoded.ok())
+          return absl::DataLossError(absl::StrCat("camera: video ", path_, ", picture ", frames_ + 1, ": ",
+                                                  decoded.status().message()));
+        picture = *decoded;
       }
       return FrameOf(picture, clock_.NowS(), ++frames_);
     } catch (const cv::Exception& problem) {
@@ -45,10 +53,17 @@ class VideoCamera : public CameraDevice {
   uint64_t stale_frames() const override { return 0; }
 
  private:
+  bool Open() {
+    if (!video_.open(path_, cv::CAP_FFMPEG) && !video_.open(path_)) return false;
+    jpegs_ = TakesJpegsAsTheyCame(&video_);
+    return true;
+  }
+
   const std::string path_;
   const Clock& clock_;
   mutable std::mutex mutex_;
   cv::VideoCapture video_;
+  bool jpegs_ = false;
   uint64_t frames_ = 0;
 };
 

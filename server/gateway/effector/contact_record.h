@@ -34,6 +34,7 @@ class ContactRecord {
   // event may have been lost.
   void EndCapture();
   void MarkLost(std::string why);
+  void SetPressed(uint32_t mask) { touch_.pressed_mask = mask; }
 
   const EffectorTouch& touch() const { return touch_; }
   bool armed() const { return armed_; }

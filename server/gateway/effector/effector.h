@@ -46,8 +46,12 @@ struct EffectorTouch {
   uint32_t boot_id = 0;
   uint64_t armed_ticks = 0;
   std::vector<std::optional<uint64_t>> contact_ticks;  // per finger; none: no contact yet
+  uint32_t pressed_mask =
+      0;  // bit per finger: pressed when the capture had ended and every finger had time to let go
   int Contacts() const;
 };
+// "finger 2", "fingers 1, 3": as people count them.
+std::string FingersText(uint32_t mask);
 
 struct EffectorState {
   bool connected = false;
@@ -72,7 +76,8 @@ class Effector {
   // FAILED_PRECONDITION names the fingers that are pressed already; UNAVAILABLE: the line is lost. `guard` (null: none)
   // is asked every 10 ms meanwhile, from this thread; its error ends the wait, and is returned.
   virtual absl::Status StartCapture(uint32_t touch, const std::function<absl::Status()>& guard = nullptr) = 0;
-  // Ends it, and waits until the device's record of the touch is known.
+  // Ends it, and waits until the device's record of the touch is known, and until no finger is pressed any more, or should
+  // not be (half a second and twice its debounce time): the tool has left the object before.
   virtual absl::Status EndCapture() = 0;
   // The contacts of the current or last capture; changes->Notify() after every change. UNAVAILABLE if the line
   // was lost since, or the device was reset, in which case its record is gone.

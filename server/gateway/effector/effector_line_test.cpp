@@ -31,9 +31,9 @@ TEST_F(EffectorLineTest, LosesAndChangesNoContactOnABadLine) {
       lost = !touch.ok() && !effector_->State().connected;
       return lost || (touch.ok() && touch->Contacts() == 3);
     }));
+    for (int i = 0; i < 3; ++i) device_->Release(i);
     const absl::Status disarmed = effector_->EndCapture();
     const absl::StatusOr<EffectorTouch> touch = effector_->Touch();
-    for (int i = 0; i < 3; ++i) device_->Release(i);
     if (!disarmed.ok() || !touch.ok()) continue;
     for (int i = 0; i < 3; ++i) ASSERT_EQ(touch->contact_ticks[i], truth[i]) << "touch " << id;
     ++right;

@@ -23,15 +23,29 @@ TEST_F(EffectorTest, TellsTheContactOfEachFinger) {
     std::vector<uint64_t> truth;
     for (int i = 0; i < fingers; ++i) truth.push_back(device_->Press(i));
     ASSERT_TRUE(WaitForContacts(fingers));
+    for (int i = 0; i < fingers; ++i) device_->Release(i);
     ASSERT_TRUE(effector_->EndCapture().ok());
     const absl::StatusOr<EffectorTouch> touch = effector_->Touch();
     ASSERT_TRUE(touch.ok()) << touch.status();
     EXPECT_EQ(touch->touch, 17u);
+    EXPECT_EQ(touch->pressed_mask, 0u);
     EXPECT_EQ(touch->boot_id, 1001u);
     EXPECT_LE(touch->armed_ticks, truth[0]);
     for (int i = 0; i < fingers; ++i) EXPECT_EQ(touch->contact_ticks[i], truth[i]);
     effector_.reset();
   }
+}
+
+TEST_F(EffectorTest, TellsWhichFingersDidNotLetGo) {
+  Open(StartQuick());
+  ASSERT_TRUE(effector_->StartCapture(1).ok());
+  for (int i = 0; i < 3; ++i) device_->Press(i);
+  ASSERT_TRUE(WaitForContacts(3));
+  device_->Release(1);
+  ASSERT_TRUE(effector_->EndCapture().ok());
+  EXPECT_EQ(effector_->Touch()->pressed_mask, 0b101u);
+  EXPECT_EQ(FingersText(0b101), "fingers 1, 3");
+  EXPECT_EQ(FingersText(0b10), "finger 2");
 }
 
 TEST_F(EffectorTest, TellsTimesBeyondTheWrapOfTheCounter) {

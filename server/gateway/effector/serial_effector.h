@@ -55,6 +55,8 @@ class SerialEffector : public Effector {
   absl::Status ReconcileTouch();  // reads the device's record of the current touch until two readings agree
   absl::Status StartCaptureOnDevice(uint32_t touch);
   absl::Status EndCaptureOnDevice();
+  // Asks until no finger is pressed, or kReleaseS is over; the mask of those that are.
+  absl::StatusOr<uint32_t> AwaitRelease();
   absl::StatusOr<EffectorTouch> RecallTouch(uint32_t touch);
   absl::Status ReadRecord(uint32_t touch, const std::function<bool(const firmware::Recalled&)>& take);
 

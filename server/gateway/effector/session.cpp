@@ -10,6 +10,22 @@
 #include "server/gateway/effector/serial_effector.h"
 
 namespace touchstone::gateway::effector {
+namespace {
+
+// What a finger needs to let go when the tool is back at the start, rig time: the switch of an emulated resistor is told
+// 0.1 s late.
+constexpr double kReleaseS = 0.5;
+constexpr double kAskAgainS = 0.01;
+
+}  // namespace
+
+std::string FingersText(uint32_t mask) {
+  std::vector<int> fingers;
+  for (int i = 0; i < firmware::kMaxFingers; ++i)
+    if ((mask >> i & 1) != 0) fingers.push_back(i + 1);
+  return absl::StrCat(fingers.size() == 1 ? "finger " : "fingers ", absl::StrJoin(fingers, ", "));
+}
+
 absl::Status SerialEffector::RunSession() {
   const uint8_t delimiter = 0;  // ends whatever an earlier owner of the port began
   unsent_.assign(1, delimiter);
@@ -109,6 +125,7 @@ absl::StatusOr<EffectorTouch> SerialEffector::RecallTouch(uint32_t touch) {
   if (absl::IsFailedPrecondition(status) && refused_.reason == firmware::RefusedReason::kUnknownTouch)
     return absl::NotFoundError(absl::StrCat("end effector: the device has no record of touch ", touch));
   if (!status.ok()) return status;
+  TOUCHSTONE_ASSIGN_OR_RETURN(result.pressed_mask, AwaitRelease());
   return result;
 }
 
@@ -136,12 +153,8 @@ absl::Status SerialEffector::StartCaptureOnDevice(uint32_t touch) {
   std::string why(status.message());
   const bool refused = absl::IsFailedPrecondition(status);
   if (refused && refused_.reason == firmware::RefusedReason::kPressed) {
-    std::vector<int> fingers;
-    for (int i = 0; i < firmware::kMaxFingers; ++i)
-      if ((refused_.detail >> i & 1) != 0) fingers.push_back(i + 1);
     why = absl::StrCat(
-        fingers.size() == 1 ? "finger " : "fingers ", absl::StrJoin(fingers, ", "),
-        fingers.size() == 1 ? " is" : " are",
+        FingersText(refused_.detail), (refused_.detail & (refused_.detail - 1)) == 0 ? " is" : " are",
         " pressed before the touch begins; move the tool away, or look whether something sticks");
   }
   std::lock_guard<std::mutex> lock(mutex_);
@@ -162,7 +175,27 @@ absl::Status SerialEffector::EndCaptureOnDevice() {
     return firmware::Decode(payload, size, &disarmed) ? Reply::kYes : Reply::kNo;
   }));
   const bool unfinished = record_.touch().touch != 0 && record_.lost().empty() && !record_.Final();
-  return unfinished ? ReconcileTouch() : absl::OkStatus();
+  if (unfinished) TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t pressed_mask, AwaitRelease());
+  std::lock_guard<std::mutex> lock(mutex_);
+  record_.SetPressed(pressed_mask);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<uint32_t> SerialEffector::AwaitRelease() {
+  double debounce_s = 0;
+  for (const EffectorFinger& finger : options_.fingers) debounce_s = std::max(debounce_s, finger.debounce_s);
+  const double until_s = timing::HostNowS() + (kReleaseS + 2 * debounce_s) / options_.time_scale;
+  firmware::Status status;
+  do {
+    TOUCHSTONE_RETURN_IF_ERROR(Ask(firmware::StatusRequest{}, [&](const uint8_t* payload, size_t size) {
+      return firmware::Decode(payload, size, &status) && status.boot_id == state_.boot_id ? Reply::kYes
+                                                                                          : Reply::kNo;
+    }));
+    if (status.pressed_mask == 0 || Stopping()) break;
+    TOUCHSTONE_RETURN_IF_ERROR(Pump(timing::HostNowS() + kAskAgainS, nullptr));
+  } while (timing::HostNowS() < until_s);
+  return status.pressed_mask;
 }
 
 }  // namespace touchstone::gateway::effector

@@ -66,8 +66,8 @@ struct Shift {
 
 class Fitter {
  public:
-  Fitter(const std::vector<ApproachState>& states, const ApproachProfile& profile)
-      : states_(states), profile_(profile) {}
+  Fitter(const std::vector<ApproachState>& states, const ApproachProfile& profile, bool none_missing)
+      : states_(states), none_missing_(none_missing), profile_(profile) {}
 
   absl::StatusOr<ApproachFit> Fit();
 
@@ -80,6 +80,7 @@ class Fitter {
   Shift MeanShift(double began_s, bool level) const;
 
   const std::vector<ApproachState>& states_;
+  const bool none_missing_;
   ApproachProfile profile_;  // its speed the commanded one, unless another one is certain
   double deviation_m_ = 0, correlation_ = 1;
   ApproachFit fit_;
@@ -101,7 +102,15 @@ absl::Status Fitter::CheckReached() const {
     farthest_m = std::max(farthest_m, state.distance_m);
   }
   if (level >= kMinApproachStates) return absl::OkStatus();
-  if (static_cast<int>(states_.size()) < kMinApproachStates || farthest_m > 2 * profile_.RampM())
+  if (none_missing_ && level > 0)
+    return absl::FailedPreconditionError(
+        absl::StrFormat("the approach was at its commanded speed of %.4g mm/s for only %d states of the "
+                        "controller before the last "
+                        "finger made contact (%d are needed), and none is missing: give the touch a lower "
+                        "speed or a longer standoff",
+                        1e3 * profile_.speed_m_s, level, kMinApproachStates));
+  if (!none_missing_ &&
+      (static_cast<int>(states_.size()) < kMinApproachStates || farthest_m > 2 * profile_.RampM()))
     return absl::UnavailableError(
         absl::StrFormat("only %d states of the approach at its full speed arrived from the controller (%d "
                         "are needed), so when it began "
@@ -245,9 +254,19 @@ double ApproachProfile::SpeedAt(double since_start_s) const {
   return std::clamp(acceleration_m_s2 * since_start_s, 0.0, speed_m_s);
 }
 
+bool NoStateIsMissing(const std::vector<ApproachState>& states, const ApproachProfile& profile) {
+  if (states.size() < 3) return false;
+  double shortest_s = std::numeric_limits<double>::infinity(), longest_s = 0;
+  for (size_t i = 1; i < states.size(); ++i) {
+    const double gap_s = states[i].time_s - states[i - 1].time_s;
+    shortest_s = std::min(shortest_s, gap_s), longest_s = std::max(longest_s, gap_s);
+  }
+  return longest_s < 1.5 * shortest_s && states.front().distance_m <= profile.RampM();
+}
+
 absl::StatusOr<ApproachFit> FitApproach(const std::vector<ApproachState>& states,
-                                        const ApproachProfile& profile) {
-  return Fitter(states, profile).Fit();
+                                        const ApproachProfile& profile, bool none_missing) {
+  return Fitter(states, profile, none_missing).Fit();
 }
 
 }  // namespace touchstone::gateway

@@ -43,10 +43,13 @@ inline constexpr int kMinApproachStates = 5;
 // Share by which the measured speed may differ from the commanded one: 1 % of 60 mm at 20 mm/s are 30 ms.
 inline constexpr double kMaxSpeedDeviation = 0.01;
 
+// Whether the controller's states of an approach, its braking included, came without a gap from before its full speed on.
+bool NoStateIsMissing(const std::vector<ApproachState>& states, const ApproachProfile& profile);
+
 // From the states of an approach in the order of their times, none of its braking. Outliers are left out.
 // UNAVAILABLE: too few states arrived, the touch may be made again. FAILED_PRECONDITION: it was not made at the
-// commanded speed; says both speeds and what to do.
+// commanded speed, or, with none of its states missing, was at it too briefly; says what to do.
 absl::StatusOr<ApproachFit> FitApproach(const std::vector<ApproachState>& states,
-                                        const ApproachProfile& profile);
+                                        const ApproachProfile& profile, bool none_missing = false);
 
 }  // namespace touchstone::gateway

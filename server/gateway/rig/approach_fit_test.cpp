@@ -183,6 +183,26 @@ TEST(ApproachFit, AnApproachThatNeverReachedItsSpeedIsRefused) {
   EXPECT_THAT(std::string(fit.status().message()), testing::HasSubstr("standoff"));
 }
 
+// A CB3 tells 125 states a second: at 50 mm/s one every 0.4 mm, of which 1 mm is ramp. Nobody gains by touching again.
+TEST(ApproachFit, AnApproachThatIsTooShortForItsSpeedIsRefusedForGoodIfNoStateIsMissing) {
+  Draw draw;
+  draw.profile = {0.05, 1.2};
+  draw.until_s = 0.08, draw.states = 10;
+  std::vector<ApproachState> states = Recording(draw, 1);
+  EXPECT_TRUE(NoStateIsMissing(states, draw.profile));
+  const absl::Status brief = FitApproach(states, draw.profile, true).status();
+  EXPECT_EQ(brief.code(), absl::StatusCode::kFailedPrecondition) << brief;
+  EXPECT_THAT(
+      std::string(brief.message()),
+      testing::AllOf(testing::HasSubstr("4 states"), testing::HasSubstr("lower speed or a longer standoff")));
+  states.erase(states.begin() + 7);
+  EXPECT_FALSE(NoStateIsMissing(states, draw.profile));
+  EXPECT_EQ(FitApproach(states, draw.profile).status().code(), absl::StatusCode::kUnavailable);
+  // States of the ramp are no loss, but who saw none of them does not know what else is missing.
+  draw.from_s = 0.05;
+  EXPECT_FALSE(NoStateIsMissing(Recording(draw, 1), draw.profile));
+}
+
 TEST(ApproachFit, TooFewStatesAreRefused) {
   Draw draw;
   for (const int states : {0, 1, 4}) {

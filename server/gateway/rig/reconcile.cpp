@@ -68,6 +68,10 @@ absl::Status Rig::ReconcileTouch(const std::string& session, const session::Jour
     return journal().Failed(
         session, touch.id,
         "interrupted, and the end effector was reset since; it can be made again under the same id");
+  // On its way back a finger may be pressed still.
+  if (const absl::Status released = CheckReleased(*contacts);
+      arm->phase == arm::MotionPhase::kDone && !released.ok())
+    return journal().Failed(session, touch.id, absl::StrCat("interrupted: ", released.message()));
   TouchRecording record;
   record.motion.program_id = touch.program_id;
   record.motion.transit = {Eigen::Isometry3d::Identity()};

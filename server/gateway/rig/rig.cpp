@@ -207,6 +207,24 @@ image::Intrinsics Rig::IntrinsicsOf(const image::Frame& frame) const {
   return image::PinholeIntrinsics(frame.width, frame.height, parts_.vertical_fov_rad);
 }
 
+absl::StatusOr<Rig::DryRun> Rig::BeginDryRun() const {
+  DryRun run;
+  TOUCHSTONE_ASSIGN_OR_RETURN(run.at, parts_.arm->State());
+  run.object = Status().object, run.up_face = MountedUpFace();
+  return run;
+}
+
+absl::Status Rig::MountInDryRun(const std::string& object, calibration::UpFace up_face, DryRun* run) const {
+  if (run->object == object && run->up_face == up_face) return absl::OkStatus();
+  run->object = object, run->up_face = up_face;
+  if (options_.mount_command.empty()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::UrKinematics kinematics, parts_.planner->Kinematics());
+  run->at.joints_rad = parts_.planner->limits().home_rad;
+  run->at.base_from_tip =
+      kinematics.Forward(run->at.joints_rad) * parts_.planner->calibration().flange_from_tip;
+  return absl::OkStatus();
+}
+
 absl::StatusOr<arm::PlannedTouch> Rig::Check(const std::string& object, const geometry::Bounds& bounds,
                                              const touch::CommandedTouch& touch, const arm::ArmState* from,
                                              const std::string& where) const {

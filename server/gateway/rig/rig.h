@@ -111,6 +111,16 @@ class Rig : public source::RigDevice {
   // person has to do first. Nothing else ever does: a motion on an arm without power is refused.
   absl::Status PowerOn(const source::MotionGuard& caller);
 
+  // A dry run: where the arm would be, and what would lie there.
+  struct DryRun {
+    arm::ArmState at;
+    std::string object;
+    std::optional<calibration::UpFace> up_face;
+  };
+  absl::StatusOr<DryRun> BeginDryRun() const;
+  // The object, with this face up. A rig that puts objects down by itself goes home before it turns or changes one.
+  absl::Status MountInDryRun(const std::string& object, calibration::UpFace up_face, DryRun* run) const;
+
   // Every check of a touch without motion, from `from` (null: from where the arm is) and with the face up
   // that it needs.
   absl::StatusOr<arm::PlannedTouch> Check(const std::string& object, const geometry::Bounds& bounds,

@@ -68,6 +68,7 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   // A finger without contact is certain only after the capture has ended and the device's record was read.
   TOUCHSTONE_RETURN_IF_ERROR(parts_.effector->EndCapture());
   TOUCHSTONE_ASSIGN_OR_RETURN(record.contacts, parts_.effector->Touch());
+  TOUCHSTONE_RETURN_IF_ERROR(CheckReleased(record.contacts));
   record.contacts.contact_ticks.resize(options_.fingers);
   record.tick_hz = std::max<uint32_t>(1, parts_.effector->State().tick_hz);
   record.effector_clock = parts_.effector->Clock();

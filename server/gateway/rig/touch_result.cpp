@@ -24,6 +24,17 @@ std::array<double, 6> NoPose() {
 
 }  // namespace
 
+absl::Status CheckReleased(const effector::EffectorTouch& contacts) {
+  if (contacts.pressed_mask == 0) return absl::OkStatus();
+  const bool one = (contacts.pressed_mask & (contacts.pressed_mask - 1)) == 0;
+  return absl::FailedPreconditionError(absl::StrCat(
+      effector::FingersText(contacts.pressed_mask), one ? " is" : " are",
+      " still pressed although the tool is back at its start: ", one ? "it sticks" : "they stick",
+      ", so that what was reported may be no contact, and the touch is refused; see that the finger moves "
+      "freely, or "
+      "whether a wire is broken, and touch again"));
+}
+
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,
                                         double max_gap_s) {
   const auto after = std::lower_bound(
@@ -93,21 +104,33 @@ std::optional<std::pair<double, double>> ContactSpan(const TouchRecording& recor
   return span;
 }
 
+// How far the tip had come in every state.
+std::vector<ApproachState> DistancesOf(const TouchRecording& record,
+                                       const std::vector<arm::ArmState>& states) {
+  const Eigen::Vector3d start = record.motion.transit.back().translation(),
+                        way = record.motion.end.translation() - start;
+  std::vector<ApproachState> distances;
+  for (const arm::ArmState& state : states) {
+    if (!distances.empty() && state.controller_time_s <= distances.back().time_s) continue;  // sent twice
+    distances.push_back(
+        {state.controller_time_s, way.normalized().dot(state.base_from_tip.translation() - start)});
+  }
+  return distances;
+}
+
 // The states of the approach at its commanded course: until it brakes, whether at the last contact or at the end of
 // the stroke.
-std::vector<ApproachState> CourseOf(const TouchRecording& record, const std::vector<arm::ArmState>& states) {
+std::vector<ApproachState> CourseOf(const TouchRecording& record,
+                                    const std::vector<ApproachState>& distances) {
   const arm::ArmTouch& motion = record.motion;
-  const Eigen::Vector3d start = motion.transit.back().translation(), way = motion.end.translation() - start;
+  const Eigen::Vector3d way = motion.end.translation() - motion.transit.back().translation();
   const ApproachProfile profile{motion.speed_m_s, record.acceleration_m_s2};
   const double brakes_m = way.norm() - profile.RampM();
   const std::optional<std::pair<double, double>> contacts = ContactSpan(record);
   std::vector<ApproachState> course, all;
   int free_states = 0;
-  for (const arm::ArmState& state : states) {
-    ApproachState each{state.controller_time_s,
-                       way.normalized().dot(state.base_from_tip.translation() - start)};
+  for (const ApproachState& each : distances) {
     if (each.distance_m > brakes_m) break;
-    if (!all.empty() && each.time_s <= all.back().time_s) continue;  // sent twice
     all.push_back(each);
     if (!contacts.has_value() || each.time_s > contacts->second) continue;
     course.push_back(each);
@@ -133,9 +156,10 @@ absl::StatusOr<Approach> ApproachOf(const TouchRecording& record) {
   // Recovered after an interruption: nobody recorded the arm.
   if (states.empty() && record.recovered) return approach;
   TOUCHSTONE_RETURN_IF_ERROR(CheckSpeedScaling(states));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const ApproachFit fit,
-      FitApproach(CourseOf(record, states), {record.motion.speed_m_s, record.acceleration_m_s2}));
+  const std::vector<ApproachState> distances = DistancesOf(record, states);
+  const ApproachProfile profile{record.motion.speed_m_s, record.acceleration_m_s2};
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ApproachFit fit, FitApproach(CourseOf(record, distances), profile,
+                                                                 NoStateIsMissing(distances, profile)));
   approach.seen = true;
   approach.began_controller_s = fit.began_s;
   approach.began_controller_uncertainty_s = fit.began_uncertainty_s;

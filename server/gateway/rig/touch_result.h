@@ -31,6 +31,10 @@ struct TouchRecording {
 // says or by its poses: times would not be comparable. UNAVAILABLE if too few states of it arrived.
 absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record);
 
+// Whether every finger let go when the tool was back at its start. FAILED_PRECONDITION names those that did not: such a
+// finger sticks, and what it reported may be no contact.
+absl::Status CheckReleased(const effector::EffectorTouch& contacts);
+
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within
 // 0.1 rig s.
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,

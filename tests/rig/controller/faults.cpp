@@ -34,6 +34,8 @@ constexpr Row kRows[] = {
     {"network", Range::kPositive, 0, true},
     {"speed_scaling", Range::kProbability, 1, false},
     {"speed_slider", Range::kProbability, 1, false},
+    {"half_turn_longer", Range::kProbability, 0.5, false},
+    {"old_software", Range::kSwitch, 0, false},
     {"local_control", Range::kSwitch, 0, false},
     {"stale_frame", Range::kSwitch, 0, false},
     {"camera_unplug", Range::kPositive, 0, true},

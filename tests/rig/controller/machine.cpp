@@ -233,6 +233,10 @@ bool Machine::LocalControl() const {
   return options_.model != "ur3" && faults_ && faults_->Get("local_control") != 0;
 }
 
+bool Machine::OldSoftware() const {
+  return faults_ && faults_->Get("old_software") != 0;
+}
+
 bool Machine::Unlock() {
   if (safety_mode_ != kProtectiveStop) return true;
   if (now_s_ < stopped_at_s_ + kUnlockAfterS) return false;

@@ -112,6 +112,7 @@ class Machine : public ScriptHost {
   int LaggingSafetyMode() const;
   // Only e-Series controllers know it: what comes from outside may be read, but moves nothing.
   bool LocalControl() const;
+  bool OldSoftware() const;  // of before 5.3.0 (3.9.0 on CB3)
   int robot_mode() const { return robot_mode_; }
   int safety_mode() const { return safety_mode_; }
 
@@ -183,6 +184,7 @@ class Machine : public ScriptHost {
   // Empty: the thread may begin a motion now. Otherwise it has to wait.
   bool MustWaitToMove(int thread, bool keeps_going);
   void RequireReady() const;
+  bool TakesTheLongerTurn();  // on a line of half a turn
   void FinishMotion(double time_s);
   void Progress(double time_s);
   void Tell(const std::function<void()>& changed);

@@ -131,11 +131,18 @@ Outcome Machine::Begin(std::unique_ptr<Motion> motion, double speed, double acce
   return {Outcome::Wait::kRest, {}, 0};
 }
 
+bool Machine::TakesTheLongerTurn() {
+  if (!faults_) return false;
+  return std::uniform_real_distribution<double>()(random_) < faults_->Get("half_turn_longer");
+}
+
 Outcome Machine::MoveLine(const Eigen::Isometry3d& base_from_tip, double speed, double acceleration,
                           double duration_s, int thread) {
   if (MustWaitToMove(thread, false)) return {Outcome::Wait::kRetry, {}, 0};
   auto motion = std::make_unique<Motion>();
   auto line = std::make_unique<LinePath>(geometry_, joints_, flange_from_tip_, base_from_tip);
+  if (line->TurnRad() >= kHalfTurnFromRad && TakesTheLongerTurn())
+    line = std::make_unique<LinePath>(geometry_, joints_, flange_from_tip_, base_from_tip, LineTurn::kLonger);
   motion->line = line.get();
   motion->path = std::move(line);
   motion->thread = thread;

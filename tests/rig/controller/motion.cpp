@@ -30,12 +30,13 @@ std::optional<std::string> TooFast(const ArmGeometry& arm, const Joints& speed_r
 }  // namespace
 
 LinePath::LinePath(const ArmGeometry& arm, const Joints& from, const Eigen::Isometry3d& flange_from_tip,
-                   const Eigen::Isometry3d& base_from_tip_end)
+                   const Eigen::Isometry3d& base_from_tip_end, LineTurn turn)
     : arm_(arm),
       tip_from_flange_(flange_from_tip.inverse()),
       from_(BaseFromFlange(arm, from) * flange_from_tip),
       to_(base_from_tip_end),
       turn_(RotationVector(to_.linear() * from_.linear().transpose())) {
+  if (turn == LineTurn::kLonger && turn_.norm() > 0) turn_ -= 2 * M_PI * turn_.normalized();
   metres_ = (to_.translation() - from_.translation()).norm();
   const double turned = kMetresPerRadian * turn_.norm();
   length_ = metres_ > kTurnOnly ? metres_ : turned;

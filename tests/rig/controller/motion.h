@@ -32,16 +32,23 @@ class Path {
 inline constexpr double kMetresPerRadian = 0.25;
 inline constexpr double kTurnOnly = 1e-4;  // m; a shorter line only turns
 
+// Which way round the tool turns on a line: the shorter one, or the one that begins in the other direction.
+enum class LineTurn { kShorter, kLonger };
+// From this turn on a line counts as half a turn: which way is the shorter one depends on rounding and on where exactly
+// the arm stands, and a controller may take either (UR documents none: script manual, movel).
+inline constexpr double kHalfTurnFromRad = 3.0892;  // 177 deg
+
 class LinePath : public Path {
  public:
   LinePath(const ArmGeometry& arm, const Joints& from, const Eigen::Isometry3d& flange_from_tip,
-           const Eigen::Isometry3d& base_from_tip_end);
+           const Eigen::Isometry3d& base_from_tip_end, LineTurn turn = LineTurn::kShorter);
   Joints JointsAt(double length) const override;
   Joints Direction(double length) const override;
   double Length() const override { return length_; }
   std::optional<Obstacle> FirstObstacle(double speed, double acceleration) const override;
 
   Eigen::Isometry3d TipAt(double length) const;
+  double TurnRad() const { return turn_.norm(); }
   const Eigen::Isometry3d& from() const { return from_; }
   const Eigen::Isometry3d& to() const { return to_; }
   // Metres of the tip per unit of length: 1, less if the turn is what counts, 0 for a turn on the spot.

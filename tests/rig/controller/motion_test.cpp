@@ -120,6 +120,24 @@ TEST(LinePath, KeepsTheTipOnTheLineWhileItTurns) {
   }
 }
 
+TEST(LinePath, TurnsHalfWayRoundInEitherDirectionToTheSameEnd) {
+  const ArmGeometry arm = GeometryOf("ur3e");
+  const Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d end = BaseFromFlange(arm, Home());
+  const Eigen::Vector3d x = end.linear().col(0);
+  end.rotate(Eigen::AngleAxisd(3.1, Eigen::Vector3d::UnitZ()));
+  const LinePath shorter(arm, Home(), tool, end), longer(arm, Home(), tool, end, LineTurn::kLonger);
+  EXPECT_NEAR(shorter.TurnRad(), 3.1, 1e-9);
+  EXPECT_NEAR(longer.TurnRad(), 2 * M_PI - 3.1, 1e-9);
+  const auto half = [&](const LinePath& path) -> Eigen::Vector3d {
+    return path.TipAt(path.Length() / 2).linear().col(0);
+  };
+  EXPECT_LT(half(shorter).dot(half(longer)), -0.999) << "half-way they point in opposite directions";
+  EXPECT_NEAR(half(shorter).dot(x), std::cos(1.55), 1e-9);
+  for (const LinePath* path : {&shorter, &longer})
+    EXPECT_TRUE(BaseFromFlange(arm, path->JointsAt(path->Length())).linear().isApprox(end.linear(), 1e-6));
+}
+
 // Machine: programs that move.
 
 struct Rig {

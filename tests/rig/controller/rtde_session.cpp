@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace touchstone::rig {
 namespace {
@@ -34,6 +35,14 @@ std::string Text(const std::string& message, uint8_t level) {
       .Text(source)
       .Put(level);
   return RtdeMessage('M', to.bytes);
+}
+
+// Registers that came with 3.9 (CB3) and 5.3 (e-Series).
+bool IsUpperRegister(const std::string& name) {
+  const size_t number = name.find("register_");
+  if (number == std::string::npos) return false;
+  const int index = std::atoi(name.c_str() + number + 9);
+  return name.find("_bit_") == std::string::npos && index >= 24 && index < 48;
 }
 
 }  // namespace
@@ -78,7 +87,12 @@ std::string RtdeSession::Reply(uint8_t type, std::string_view payload) {
     }
     case 'v': {
       WireWriter to;
-      if (e_series_)
+      if (machine_->OldSoftware())
+        to.Put(uint32_t{e_series_ ? 5u : 3u})
+            .Put(uint32_t{e_series_ ? 2u : 8u})
+            .Put(uint32_t{0})
+            .Put(uint32_t{61336});
+      else if (e_series_)
         to.Put(uint32_t{5}).Put(uint32_t{11}).Put(uint32_t{0}).Put(uint32_t{108249});
       else
         to.Put(uint32_t{3}).Put(uint32_t{15}).Put(uint32_t{8}).Put(uint32_t{106339});
@@ -115,7 +129,8 @@ std::string RtdeSession::SetUpOutputs(std::string_view payload) {
   bool all = true;
   for (const std::string& name : Names(from.left)) {
     const auto row = RtdeOutputs().find(name);
-    const bool found = row != RtdeOutputs().end() && (e_series_ || !row->second.e_series_only);
+    const bool found = row != RtdeOutputs().end() && (e_series_ || !row->second.e_series_only) &&
+                       !(machine_->OldSoftware() && IsUpperRegister(name));
     if (found) outputs_.push_back(&row->second);
     all &= found;
     types += (types.empty() ? "" : ",") + (found ? row->second.type : "NOT_FOUND");
@@ -131,7 +146,8 @@ std::string RtdeSession::SetUpInputs(std::string_view payload) {
   bool all = true;
   for (const std::string& name : Names(payload)) {
     const auto found = RtdeInputs().find(name);
-    std::string type = found != RtdeInputs().end() ? found->second.type : "NOT_FOUND";
+    const bool known = found != RtdeInputs().end() && !(machine_->OldSoftware() && IsUpperRegister(name));
+    std::string type = known ? found->second.type : "NOT_FOUND";
     const auto holder = taken_->find(name);
     if (holder != taken_->end() && holder->second != this) type = "IN_USE";
     if (type == "NOT_FOUND" || type == "IN_USE")
@@ -156,7 +172,9 @@ std::string RtdeSession::TakeInputs(std::string_view payload) {
   if (!from.ok || recipe == inputs_.end()) return Text("no input recipe has the id " + std::to_string(id), 1);
   size_t bytes = 0;
   for (const Input& input : recipe->second) bytes += input.input->bytes;
-  if (from.left.size() != bytes)
+  // What is longer is read as far as the recipe goes, an assumption: ur_rtde 1.6.5 sends getForwardKinematics(q, tcp) with a
+  // tool of zeros as 12 numbers of a recipe of 6, and waited for ever for the answer to what was refused.
+  if (from.left.size() < bytes)
     return Text("input recipe " + std::to_string(id) + " takes " + std::to_string(bytes) + " bytes, not " +
                     std::to_string(from.left.size()),
                 1);

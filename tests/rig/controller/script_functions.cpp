@@ -22,11 +22,10 @@ Eigen::Isometry3d TipTarget(Machine& machine, const Value& target) {
   return BaseFromFlange(machine.geometry(), six) * machine.flange_from_tip();
 }
 
-Joints JointTarget(Machine& machine, const Value& target, const Joints& near) {
+Joints JointTarget(Machine& machine, const Value& target, const Joints& near, const Eigen::Isometry3d& tool) {
   const Vector6 six = target.AsSix("the target");
   if (target.kind == Value::Kind::kList) return six;
-  const auto found =
-      AllInverse(machine.geometry(), FromPose(six) * machine.flange_from_tip().inverse(), near);
+  const auto found = AllInverse(machine.geometry(), FromPose(six) * tool.inverse(), near);
   if (found.empty()) throw ScriptError("no joint positions reach the pose " + target.ToText());
   return found.front();
 }
@@ -63,8 +62,9 @@ const std::vector<BuiltinRow>& MainRows() {
        }},
       {{"movej", {"q", "a", "v", "t", "r"}, 1},
        [](Machine& m, const Arguments& x, int thread) {
-         return m.MoveJoints(JointTarget(m, x[0], m.JointsAt(m.now_s())), NumberOr(x, 2, "v", 1.05),
-                             NumberOr(x, 1, "a", 1.4), NumberOr(x, 3, "t", 0), thread);
+         return m.MoveJoints(JointTarget(m, x[0], m.JointsAt(m.now_s()), m.flange_from_tip()),
+                             NumberOr(x, 2, "v", 1.05), NumberOr(x, 1, "a", 1.4), NumberOr(x, 3, "t", 0),
+                             thread);
        }},
       {{"speedl", {"xd", "a", "t", "aRot", "t_min"}, 1},
        [](Machine& m, const Arguments& x, int thread) {
@@ -162,7 +162,8 @@ const std::vector<BuiltinRow>& MainRows() {
          const Joints near = Given(x, 1) ? Joints(x[1].AsSix("qnear")) : m.JointsAt(m.now_s());
          Value pose = x[0];
          pose.kind = Value::Kind::kPose;
-         return Result(Value::Vector(JointTarget(m, pose, near), Value::Kind::kList));
+         const Eigen::Isometry3d tool = Given(x, 4) ? FromPose(x[4].AsSix("tcp")) : m.flange_from_tip();
+         return Result(Value::Vector(JointTarget(m, pose, near, tool), Value::Kind::kList));
        }},
       {{"get_forward_kin", {"q", "tcp"}, 0},
        [](Machine& m, const Arguments& x, int) {
