@@ -128,6 +128,10 @@ TEST_F(Latch, AnEmergencyStopBetweenMotionsHoldsOverPowerOnAndARestart) {
   ExpectNothingMovesUntilReset("ROBOT_EMERGENCY_STOP");
   EXPECT_EQ(RigState().arm().robot_mode(), v1::ROBOT_MODE_POWER_OFF) << "a retry powered the arm on";
   EXPECT_TRUE(Reset().ok());
+  {
+    KeptLease lease(control_.get(), "a person", true);
+    EXPECT_TRUE(PowerOn(lease.token()).ok());
+  }
   ExpectTheTouchCanBeMade(FromAbove(), "afterwards");
   KillGatewayProcess();
   ExpectEveryResultIsItsOwnTouch();
@@ -219,6 +223,7 @@ TEST_F(Latch, NothingThatCouldMoveTheArmIsSentAfterAStopAtAnyMoment) {
   {
     KeptLease lease(control_.get(), "client", true);
     const auto began = std::chrono::steady_clock::now();
+    ASSERT_TRUE(PowerOn(lease.token()).ok());
     const Answer touch = Touch(lease.token(), FromAbove(QuickMS()), "whole");
     ASSERT_TRUE(touch.status.ok()) << touch.status.error_message();
     whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
@@ -229,11 +234,17 @@ TEST_F(Latch, NothingThatCouldMoveTheArmIsSentAfterAStopAtAnyMoment) {
   // At least so many; how long powering up takes depends on what else the machine does. The rest is of the second tier.
   const int tries = SecondTierRuns() ? 40 : 12, while_powering_wanted = SecondTierRuns() ? 4 : 2;
   for (int k = 0; k < tries || (while_powering < while_powering_wanted && k < 400); ++k) {
-    // A person switches the arm off.
+    // A person switches the arm off; if it was on, that latches.
+    const bool ran_before = RigState().arm().robot_mode() == v1::ROBOT_MODE_RUNNING;
     SendToDashboard("power off\n");
     WaitUntil([&] { return RigState().arm().robot_mode() == v1::ROBOT_MODE_POWER_OFF; }, "the arm is off");
+    WaitUntil([&] { return !ran_before || !StopReason().empty(); }, "it latches");
+    ASSERT_TRUE(Reset().ok());
     KeptLease lease(control_.get(), "client", true);
-    auto touch = TouchLater(lease.token(), FromAbove(QuickMS(), 1), "stopped " + std::to_string(k));
+    auto touch = std::async(std::launch::async, [&, k] {
+      PowerOn(lease.token());
+      return Touch(lease.token(), FromAbove(QuickMS(), 1), "stopped " + std::to_string(k));
+    });
     // Powering up comes first: every second stop is an early one.
     std::this_thread::sleep_for(std::chrono::duration<double>(moment(random) * (k % 2 == 0 ? 1 : 0.3)));
     Stop("at any moment");

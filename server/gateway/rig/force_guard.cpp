@@ -17,7 +17,11 @@ constexpr double kReleaseShare = 0.25;          // of the limit, by which the fo
 
 }  // namespace
 
-Eigen::Vector3d ForceAtRest(const arm::Arm& arm) {
+Eigen::Vector3d ForceOf(const arm::ArmState& state, const Eigen::Vector3d& zeroed_n) {
+  return state.tip_force_n + state.base_from_tip.linear() * zeroed_n;
+}
+
+Eigen::Vector3d ForceAtRest(const arm::Arm& arm, const Eigen::Vector3d& zeroed_n) {
   const absl::StatusOr<arm::ArmState> now = arm.State();
   if (!now.ok()) return Eigen::Vector3d::Zero();  // whoever watches the motion finds that too
   for (const double span_s : {kRestS, kLongRestS}) {
@@ -25,7 +29,7 @@ Eigen::Vector3d ForceAtRest(const arm::Arm& arm) {
     int count = 0;
     for (const arm::ArmState& state : arm.History(now->controller_time_s - span_s, now->controller_time_s)) {
       if (state.tip_velocity_m_s.norm() > kRestMS) continue;
-      sum_n += state.tip_force_n;
+      sum_n += ForceOf(state, zeroed_n);
       ++count;
     }
     if (count > 0) return sum_n / count;
@@ -38,7 +42,8 @@ absl::Status CheckForceAtRest(const Eigen::Vector3d& at_rest_n, double max_force
   return absl::FailedPreconditionError(absl::StrFormat(
       "the arm feels %.1f N on the tip at rest, before it moves; at most %.1f N (%.0f %% of limits.max_force_n): "
       "take away what presses against the tool, or set the payload right, in the controller's installation and in "
-      "limits.payload_kg and limits.payload_cog_mm",
+      "limits.payload_kg and limits.payload_cog_mm; a sensor that was zeroed while something pressed forgets it with the "
+      "next power-up",
       at_rest_n.norm(), kNoticedShare * max_force_n, 100 * kNoticedShare));
 }
 
@@ -48,7 +53,7 @@ ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what
   const absl::StatusOr<arm::ArmState> now = arm.State();
   if (!now.ok()) return;  // whoever watches the motion finds that too
   seen_s_ = now->controller_time_s;
-  const Eigen::Vector3d felt_n = ForceAtRest(arm) + zeroed_n_;
+  const Eigen::Vector3d felt_n = ForceAtRest(arm, zeroed_n_);
   at_rest_n_ = felt_n;
   const double limit_n = kMaxRestShare * max_force_n_;
   if (at_rest_n_.norm() > limit_n) at_rest_n_ *= limit_n / at_rest_n_.norm();
@@ -63,7 +68,7 @@ absl::Status ForceGuard::Check(const arm::ArmState& newest) {
 }
 
 absl::Status ForceGuard::CheckState(const arm::ArmState& state) {
-  const double force_n = (state.tip_force_n + zeroed_n_ - at_rest_n_).norm();
+  const double force_n = (ForceOf(state, zeroed_n_) - at_rest_n_).norm();
   if (force_n <= allowed_n_) {
     allowed_n_ = std::max(max_force_n_, std::min(allowed_n_, force_n + kReleaseShare * max_force_n_));
     return absl::OkStatus();

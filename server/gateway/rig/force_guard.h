@@ -10,9 +10,13 @@
 
 namespace touchstone::gateway {
 
+// What a state's force is without what the sensor shows less since it was zeroed while something pressed. `zeroed_n`: tip
+// frame. Base frame's axes, N.
+Eigen::Vector3d ForceOf(const arm::ArmState& state, const Eigen::Vector3d& zeroed_n);
+
 // What the arm feels at rest: the mean over the states of the last 0.2 s, or of the last 2 s if it moved until now.
 // Base frame's axes, N. Zero: no state is at rest.
-Eigen::Vector3d ForceAtRest(const arm::Arm& arm);
+Eigen::Vector3d ForceAtRest(const arm::Arm& arm, const Eigen::Vector3d& zeroed_n);
 
 // OK, or FAILED_PRECONDITION: at rest the arm feels more than 45 % of the limit. A payload that is set wrong or something
 // that presses against the tool, either way no motion should begin. (The error of an arm's sensor is at most half the
@@ -23,7 +27,7 @@ absl::Status CheckForceAtRest(const Eigen::Vector3d& at_rest_n, double max_force
 // than half the limit is, so that something that presses against the tool is not taken for one. Not thread-safe.
 //
 // Setting a payload zeroes an e-Series' sensor (UR's script manual, set_target_payload), also while something presses.
-// `zeroed_n`, what was felt at rest before that minus what was felt after it, is added to every state.
+// `zeroed_n`, what was felt at rest before that minus what was felt after it, in the tip's frame, is added to every state.
 //
 // A motion that begins pressed, as the way out after this guard has stopped an approach, may let go: the force may not
 // grow by more than a quarter of the limit above the lowest since, until it is within the limit.

@@ -207,7 +207,6 @@ class Rig : public source::RigDevice {
     bool let_go = false;      // it was told to move
     double hung_s = 0;        // the longest hang of its supervisor, host time; 0: none
     double hung_at_s = 0;     // when that ended
-    Eigen::Vector3d zeroed_n = Eigen::Vector3d::Zero();  // ForceGuard
   };
   // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
   // motion may not go on (the controller's safety mode, its guard).
@@ -268,6 +267,7 @@ class Rig : public source::RigDevice {
   std::atomic<bool> closing_{false};          // Close was called
   std::atomic<uint32_t> given_up_{0};         // the program that was given up last; 0: none
   std::atomic<bool> left_pressed_{false};     // the last motion did not come to its end: the tool may press
+  Eigen::Vector3d zeroed_n_ = Eigen::Vector3d::Zero();  // ForceGuard: by the last program; of the one that moves
   double paused_stop_s_ = -1e9;               // host time at which EndPausedProgram sent a stop
   std::mutex watch_mutex_;
   std::condition_variable watch_ends_;

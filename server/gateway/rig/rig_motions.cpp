@@ -72,6 +72,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
     parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
   if (status.ok()) status = parts_.arm->Ready();
+  if (status.ok()) zeroed_n_.setZero();
   if (!status.ok()) {
     if (!parts_.arm->State().ok())
       Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(), ")"));

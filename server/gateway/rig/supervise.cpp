@@ -48,7 +48,7 @@ absl::Status Rig::MayGoOn(const source::MotionGuard& guard) {
 absl::Status Rig::Launch(Program* program, const char* what,
                          const std::function<absl::Status(const arm::StartGuard&)>& send) {
   // A motion that begins where the last one was broken off may begin pressed, to let go.
-  const Eigen::Vector3d before_n = ForceAtRest(*parts_.arm);
+  const Eigen::Vector3d before_n = ForceAtRest(*parts_.arm, zeroed_n_);
   const double sent_s = ControllerNowS();
   if (!left_pressed_) TOUCHSTONE_RETURN_IF_ERROR(CheckForceAtRest(before_n, program->max_force_n));
   bool went_out = false;
@@ -59,6 +59,7 @@ absl::Status Rig::Launch(Program* program, const char* what,
   });
   if (!sent.ok()) return went_out ? GiveUp(program, what, sent) : sent;
   Eigen::Vector3d prepared_n = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d tip_from_base = Eigen::Matrix3d::Identity();
   TOUCHSTONE_RETURN_IF_ERROR(Supervise(
       program, kProgramStartsS + 1, what, [&](const arm::ArmState& newest) -> absl::StatusOr<bool> {
         double first_s = newest.controller_time_s;
@@ -70,9 +71,10 @@ absl::Status Rig::Launch(Program* program, const char* what,
           prepared_n += state.tip_force_n, ++count;
         }
         prepared_n /= std::max(count, 1);
+        tip_from_base = newest.base_from_tip.linear().transpose();
         return newest.controller_time_s - first_s >= kPreparedRestS;
       }));
-  program->zeroed_n = before_n - prepared_n;
+  zeroed_n_ = tip_from_base * (before_n - prepared_n);
   const absl::Status moves = parts_.arm->BeginMotion(program->id, [&] {
     const absl::Status allowed = program->guard();
     program->let_go = allowed.ok();
@@ -86,7 +88,7 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
   const double began_s = NowS();
   double at_rest_since_s = 0, looked_s = began_s;
   bool seen = program->let_go;  // its id was reported
-  ForceGuard force(*parts_.arm, program->max_force_n, what, program->zeroed_n);
+  ForceGuard force(*parts_.arm, program->max_force_n, what, zeroed_n_);
   double states_seen_s = -1;  // controller time
   const auto give_up = [&](const absl::Status& why) {
     if (const double now_s = NowS(); now_s - looked_s > kHungS)
