@@ -17,7 +17,7 @@ from programs import CLIENT, Result, Server, scratch
 # Largest time from the blow to a batch of the other server, beside the work itself: silence, sign of life, connection, and
 # what a busy machine adds.
 LIMIT_S = 10.0
-SAMPLES = 60_000
+SAMPLES = 200_000
 SEED = 8
 
 # Streams from the servers given, and prints a digest of what came, as a client of its own.
@@ -55,7 +55,7 @@ def _finish(process: subprocess.Popen, began: float) -> tuple[int, str, str, flo
 
 
 def run(blows: int = 30, clients=("command line", "python"), signals=("SIGKILL", "SIGSTOP")) -> Result:
-    """blows: how many of each client and signal; a third before the first call is answered, the others later."""
+    """blows: how many of each client and signal; half of them as it begins, the others in mid-stream."""
     result, chance = Result(), random.Random(SEED)
     with scratch() as folder, Server() as second:
         for client in clients:
@@ -75,7 +75,7 @@ def run(blows: int = 30, clients=("command line", "python"), signals=("SIGKILL",
                         began = time.monotonic()
                         while process.poll() is None and _files(first) <= idle:
                             time.sleep(0.0005)
-                        time.sleep(chance.choice([0, 0.001, 0.003, 0.01, 0.05, 0.2 * usual_s]))
+                        time.sleep(chance.choice([0, 0.001, 0.01, *(chance.uniform(0, 0.6 * usual_s) for _ in range(3))]))
                         first.process.send_signal(getattr(signal, name))
                         status, printed, said, took_s = _finish(process, began)
                     longest_s = max(longest_s, took_s)

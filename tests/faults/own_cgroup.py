@@ -8,6 +8,7 @@ import os
 import pathlib
 import time
 from collections.abc import Iterator
+from typing import Any
 
 from programs import SERVER, SMALL, Program, Result, open_stream, own_channel, wait_until
 from touchstone.v1 import source_pb2
@@ -78,11 +79,12 @@ def run(limit_mib: int = 600, streams: int = 40) -> Result:
             result.expect(server.alive(), f"the kernel ended the server at {largest >> 20} of {limit_mib} MiB")
             if server.alive():
                 # HealthCheckRequest{} is no bytes; HealthCheckResponse{status: SERVING} is field 1, varint 1.
-                answer = own_channel(server.ready).unary_unary("/grpc.health.v1.Health/Check")(b"", timeout=60)
+                channel: Any = own_channel(server.ready)
+                answer = channel.unary_unary("/grpc.health.v1.Health/Check")(b"", timeout=60)
                 result.expect(answer == b"\x08\x01", f"its health check says {answer!r}")
             refused = {call.details() for call in calls if call.done()}
             result.expect(all("max_memory_mib" in words or "max_streams" in words for words in refused), f"other refusals: {refused}")
             result.seen.append(f"{streams} streams that nobody reads, in a cgroup of {limit_mib} MiB: at most {largest >> 20} MiB were used")
-            for channel in channels:
-                channel.close()
+            for each in channels:
+                each.close()
     return result

@@ -6,6 +6,7 @@ import re
 import signal
 import socket
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,7 +82,7 @@ def test_a_call_leaves_a_source_that_is_stopped(new_server, fast):
 
 
 def test_a_stream_leaves_a_source_that_is_stopped(server, new_server, losses, fast):
-    what = {"objects": ["lat00", "lat20"], "samples": 200_000, "seed": 5, "columns": ("index", "descriptor"), "batch_size": 500}
+    what: dict[str, Any] = {"objects": ["lat00", "lat20"], "samples": 200_000, "seed": 5, "columns": ("index", "descriptor"), "batch_size": 500}
     first, second = new_server(), new_server()
     batches = []
     with contextlib.ExitStack() as until_the_end:
@@ -110,7 +111,8 @@ def test_a_slow_reader_is_no_lost_source(server, losses, fast):
 def test_a_source_that_has_nothing_to_say_is_no_lost_one(server, fast):
     """It is asked for signs of life while no data flow, and does not take that for an attack, as gRPC by itself does."""
     connected = connection.Connection(server.target)
-    watch = connected.channel().unary_stream("/grpc.health.v1.Health/Watch")(b"")
+    channel: Any = connected.channel()
+    watch = channel.unary_stream("/grpc.health.v1.Health/Watch")(b"")
     next(watch)  # its state now; the next one comes when it changes
     time.sleep(5 * FAST["grpc.keepalive_time_ms"] / 1000)  # what is meant to pass is time
     assert watch.is_active()
