@@ -17,7 +17,6 @@ from programs import CLIENT, Result, Server, scratch
 # Largest time from the blow to a batch of the other server, beside the work itself: silence, sign of life, connection, and
 # what a busy machine adds.
 LIMIT_S = 10.0
-SAMPLES = 200_000
 SEED = 8
 
 # Streams from the servers given, and prints a digest of what came, as a client of its own.
@@ -35,10 +34,10 @@ def _files(program: Server) -> int:
     return len(os.listdir(f"/proc/{program.process.pid}/fd"))
 
 
-def _command(client: str, servers: str, out: pathlib.Path) -> list[str]:
+def _command(client: str, samples: int, servers: str, out: pathlib.Path) -> list[str]:
     if client == "python":
-        return [sys.executable, "-c", PYTHON, servers, str(SAMPLES)]
-    return [str(CLIENT), "stream", "--objects", "lat20,lat00", "--samples", str(SAMPLES), "--seed", "1", "--batch-size", "500",
+        return [sys.executable, "-c", PYTHON, servers, str(samples)]
+    return [str(CLIENT), "stream", "--objects", "lat20,lat00", "--samples", str(samples), "--seed", "1", "--batch-size", "500",
             "--server", servers, "--out", str(out), "-q"]
 
 
@@ -54,12 +53,12 @@ def _finish(process: subprocess.Popen, began: float) -> tuple[int, str, str, flo
     return process.returncode, printed, said, time.monotonic() - began
 
 
-def run(blows: int = 30, clients=("command line", "python"), signals=("SIGKILL", "SIGSTOP")) -> Result:
+def run(blows: int = 30, clients=("command line", "python"), signals=("SIGKILL", "SIGSTOP"), samples: int = 200_000) -> Result:
     """blows: how many of each client and signal; half of them as it begins, the others in mid-stream."""
     result, chance = Result(), random.Random(SEED)
     with scratch() as folder, Server() as second:
         for client in clients:
-            whole = subprocess.Popen(_command(client, second.target, pathlib.Path(folder) / "whole"), text=True,
+            whole = subprocess.Popen(_command(client, samples, second.target, pathlib.Path(folder) / "whole"), text=True,
                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             status, printed, said, usual_s = _finish(whole, time.monotonic())
             result.expect(status == 0, f"{client} without a blow: {said[-200:]}")
@@ -70,7 +69,7 @@ def run(blows: int = 30, clients=("command line", "python"), signals=("SIGKILL",
                     out = pathlib.Path(folder) / f"{client.replace(' ', '-')}-{name}-{k}"
                     with Server() as first:
                         idle = _files(first)
-                        process = subprocess.Popen(_command(client, f"{first.target},{second.target}", out), text=True,
+                        process = subprocess.Popen(_command(client, samples, f"{first.target},{second.target}", out), text=True,
                                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
                         began = time.monotonic()
                         while process.poll() is None and _files(first) <= idle:

@@ -62,7 +62,7 @@ def test_every_method_answers_hostile_bytes(source, part):
 
 
 def test_the_second_server_takes_over_where_the_first_is_killed():
-    passes(failover.run(blows=3, signals=("SIGKILL",)))
+    passes(failover.run(blows=2, signals=("SIGKILL",), samples=20_000))
 
 
 @pytest.mark.second_tier("repeated: more blows, and such that only silence tells, 8 s each")
