@@ -45,6 +45,10 @@ def pytest_configure(config):
         os.environ.setdefault("OMP_NUM_THREADS", "1")
     # For programs that tests start, and for touchstone.connect() without an address.
     os.environ.setdefault("TOUCHSTONE_SERVER", str(config.rootpath / "build/release/bin/touchstone-server"))
+    # Tests talk to this machine; a test of a proxy sets its own.
+    for name in ("http_proxy", "https_proxy", "grpc_proxy", "all_proxy"):
+        os.environ.pop(name, None)
+        os.environ.pop(name.upper(), None)
     path = os.environ.get("TOUCHSTONE_TEST_TIMES")
     if path and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Times(path))

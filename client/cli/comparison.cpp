@@ -287,8 +287,8 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     evidence.set_session(set.session);
     v1::GetSessionRequest request;
     request.set_name(set.session);
-    const absl::StatusOr<v1::Session> session = client::Connection::Call(
-        &v1::Sessions::Stub::GetSession, comparison->connection_->sessions(), request);
+    const absl::StatusOr<v1::Session> session =
+        comparison->connection_->Call(&v1::Sessions::Stub::GetSession, request);
     if (absl::IsNotFound(session.status()))
       return absl::NotFoundError(
           absl::StrCat("SET: ", options.set, " is no file, and at the server ", session.status().message()));
@@ -315,7 +315,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(options.set, ""));
   }
   if (set.csv.size() > kMaxInline)
-    TOUCHSTONE_RETURN_IF_ERROR(comparison->SendAhead(set.csv));
+    comparison->csv_to_send_ahead_ = std::move(set.csv);
   else
     evidence.set_csv(std::move(set.csv));
   return comparison;
@@ -325,8 +325,7 @@ Comparison::~Comparison() {
   if (sent_ahead_.empty()) return;
   v1::DeleteSessionRequest request;
   request.set_name(sent_ahead_);
-  const auto deleted =
-      client::Connection::Call(&v1::Sessions::Stub::DeleteSession, connection_->sessions(), request);
+  const auto deleted = connection_->CallOnce(&v1::Sessions::Stub::DeleteSession, request);
   if (!deleted.ok())
     cli_.Detail(
         absl::StrCat("session ", sent_ahead_, " is left at the server: ", deleted.status().message()));
@@ -335,8 +334,7 @@ Comparison::~Comparison() {
 absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes) {
   if (meshes.empty()) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection_->source(),
-                                                       v1::ListObjectsRequest()));
+                              connection_->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   std::map<std::string, std::string> hashes;
   for (const v1::Object& object : served.objects()) hashes[object.name()] = object.mesh_hash();
   for (const source::MeshSpec& source : meshes) {
@@ -376,7 +374,9 @@ absl::Status Comparison::AddImages(v1::ImageSetFiles images) {
   return absl::OkStatus();
 }
 
-absl::Status Comparison::SendAhead(const std::string& csv) {
+absl::Status Comparison::SendAhead() {
+  const std::string& csv = csv_to_send_ahead_;
+  if (csv.empty()) return absl::OkStatus();
   std::random_device random;
   const std::string name = absl::StrCat("sent-ahead-", absl::Hex(random()), absl::Hex(random()));
   grpc::ClientContext context;

@@ -11,6 +11,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/provenance.h"
+#include "server/base/status.h"
 
 namespace touchstone::cli {
 
@@ -45,19 +46,24 @@ class Comparison {
   client::Connection& connection() { return *connection_; }
   const v1::Evidence& evidence() const { return evidence_; }
 
-  // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it.
+  // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it. A lost server
+  // is replaced by the next one, which begins anew.
   template <typename Response, typename Start>
-  absl::StatusOr<v1::Report> Run(const Start& start) const;
+  absl::StatusOr<v1::Report> Run(const Start& start);
 
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
   absl::Status SendMeshes(const std::vector<source::MeshSpec>& meshes);
   absl::Status AddImages(v1::ImageSetFiles images);
-  absl::Status SendAhead(const std::string& csv);
+  // What is too large for one request goes ahead as a session, once to each server that is asked.
+  absl::Status SendAhead();
+  template <typename Response, typename Start>
+  absl::StatusOr<v1::Report> Attempt(const Start& start, ProgressBar* bar);
 
   const Cli& cli_;
   std::unique_ptr<client::Connection> connection_;
   v1::Evidence evidence_;
+  std::string csv_to_send_ahead_;
   std::string sent_ahead_;                // the session's name
   std::string set_sha256_;                // of the set's file; empty: it is none here
   std::vector<source::MeshSpec> meshes_;  // files that were read
@@ -69,25 +75,39 @@ absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, 
 absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
 
 template <typename Response, typename Start>
-absl::StatusOr<v1::Report> Comparison::Run(const Start& start) const {
+absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* bar) {
+  if (sent_ahead_.empty()) TOUCHSTONE_RETURN_IF_ERROR(SendAhead());
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
-  ProgressBar bar(!cli_.output().quiet);
   const auto reader = start(&context);
   Response response;
   v1::Report report;
   bool reported = false;
   while (reader->Read(&response)) {
-    if (response.has_progress()) bar.ShowStage(response.progress().stage(), response.progress().done());
+    if (response.has_progress()) bar->ShowStage(response.progress().stage(), response.progress().done());
     if (!response.has_report()) continue;
     report = std::move(*response.mutable_report());
     reported = true;
   }
-  bar.Clear();
-  const absl::Status status = client::FromGrpc(reader->Finish());
+  bar->Clear();
+  absl::Status status = client::FromGrpc(reader->Finish());
+  if (!Interrupt::Raised()) status = client::LostWhereCancelled(status);
+  // Another server does not have it.
+  if (client::IsLostServer(status)) sent_ahead_.clear();
   if (!status.ok()) return status;
   if (!reported) return absl::InternalError("the source ended without a report");
-  AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &report);
+  return report;
+}
+
+template <typename Response, typename Start>
+absl::StatusOr<v1::Report> Comparison::Run(const Start& start) {
+  ProgressBar bar(!cli_.output().quiet);
+  absl::StatusOr<v1::Report> report;
+  TOUCHSTONE_RETURN_IF_ERROR(connection_->Retrying([&] {
+    report = Attempt<Response>(start, &bar);
+    return report.status();
+  }));
+  AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &*report);
   return report;
 }
 

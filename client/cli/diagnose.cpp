@@ -43,9 +43,8 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   if (!changed) {
     v1::GetModelRequest request;
     *request.mutable_model() = comparison->evidence().model();
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const v1::Model same,
-        client::Connection::Call(&v1::Models::Stub::GetModel, comparison->connection().models(), request));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Model same,
+                                comparison->connection().Call(&v1::Models::Stub::GetModel, request));
     yaml = same.yaml();
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
@@ -101,10 +100,10 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::DiagnoseRequest request;
   request.set_with_surface_map(options.with_surface_map);
-  *request.mutable_evidence() = comparison->evidence();
   request.set_save_model(options.keep_as);
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+                                *request.mutable_evidence() = comparison->evidence();
                                 return comparison->connection().diagnosis().Diagnose(context, request);
                               }));
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));

@@ -12,6 +12,7 @@
 #include "server/base/version.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
+#include "server/service/channel.h"
 
 namespace touchstone::cli {
 namespace {
@@ -77,6 +78,7 @@ class Doctor {
   absl::Status Run() {
     CheckProcessor();
     CheckRenderers();
+    CheckProxy();
     const absl::Status source = CheckSource();
     if (cli_.output().json)
       PrintJson(json_);
@@ -148,11 +150,23 @@ class Doctor {
     }
   }
 
+  void CheckProxy() {
+    json_["proxies"] = Json::object();
+    for (const std::string& server : SplitCommas(cli_.source().servers)) {
+      const std::string proxy = service::ProxyFor(server);
+      json_["proxies"][server] = proxy;
+      Add("Proxy", true,
+          proxy.empty() ? absl::StrCat(server, " is reached without one")
+                        : absl::StrCat(server, " is reached through ", proxy,
+                                       "; hosts in no_proxy are reached without it"));
+    }
+    if (json_["proxies"].empty()) Add("Proxy", true, "none: the source is in this process");
+  }
+
   absl::Status CheckSource() {
     const absl::StatusOr<std::unique_ptr<client::Connection>> connection = cli_.Connect();
     const absl::StatusOr<v1::DescribeResponse> response =
-        connection.ok() ? client::Connection::Call(&v1::Source::Stub::Describe, (*connection)->source(),
-                                                   v1::DescribeRequest())
+        connection.ok() ? (*connection)->Call(&v1::Source::Stub::Describe, v1::DescribeRequest())
                         : absl::StatusOr<v1::DescribeResponse>(connection.status());
     if (!response.ok()) {
       Add("Source", false, "the error below says why it cannot be used");

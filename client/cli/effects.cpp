@@ -204,8 +204,7 @@ absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
 absl::Status RunEffects(const Cli& cli, const std::string& name) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListEffectsResponse response,
-                              client::Connection::Call(&v1::Models::Stub::ListEffects, connection->models(),
-                                                       v1::ListEffectsRequest()));
+                              connection->Call(&v1::Models::Stub::ListEffects, v1::ListEffectsRequest()));
   if (!name.empty()) {
     std::vector<std::string> known;
     for (const v1::Effect& effect : response.effects()) {

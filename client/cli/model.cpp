@@ -27,8 +27,7 @@ absl::StatusOr<model::Model> LoadModel(const Cli& cli, const std::string& text) 
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   v1::GetModelRequest request;
   *request.mutable_model() = ref;
-  absl::StatusOr<v1::Model> model =
-      client::Connection::Call(&v1::Models::Stub::GetModel, connection->models(), request);
+  absl::StatusOr<v1::Model> model = connection->Call(&v1::Models::Stub::GetModel, request);
   if (absl::IsNotFound(model.status()))
     return absl::NotFoundError(absl::StrCat(model.status().message(),
                                             "; a model file is given with its folder or extension: ./", text,

@@ -22,8 +22,7 @@ absl::Status WaitForParts(const Cli& cli, client::Connection* connection,
                           const std::function<void(const std::string&)>& log) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(cli.source().wait_s);
   for (bool waiting = false;; waiting = true) {
-    const absl::StatusOr<v1::RigState> rig =
-        client::Connection::Call(&v1::Rig::Stub::GetRig, connection->rig(), v1::GetRigRequest());
+    const absl::StatusOr<v1::RigState> rig = connection->Call(&v1::Rig::Stub::GetRig, v1::GetRigRequest());
     if (!rig.ok()) return absl::OkStatus();  // a source of another kind
     const bool arm = rig->arm().connected(), effector = rig->effector().connected();
     if ((arm && effector) || std::chrono::steady_clock::now() > end) return absl::OkStatus();

@@ -17,8 +17,7 @@ Json VectorMm(const v1::Vector3& v) {
 absl::Status RunObjects(const Cli& cli) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse response,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection->source(),
-                                                       v1::ListObjectsRequest()));
+                              connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   if (cli.output().json) {
     Json list = Json::array();
     for (const v1::Object& object : response.objects())

@@ -64,9 +64,8 @@ absl::StatusOr<PlannedTouches> Expand(client::Connection* connection, const Plan
       const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
       request.set_first_index(options.first + done);
       request.set_count(step);
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          const v1::ExpandPlanResponse response,
-          client::Connection::Call(&v1::Source::Stub::ExpandPlan, connection->source(), request));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ExpandPlanResponse response,
+                                  connection->Call(&v1::Source::Stub::ExpandPlan, request));
       for (const v1::CommandedTouch& touch : response.touches()) {
         client::MeasuredTouch row;
         row.touch = options.first + planned.touches.size();

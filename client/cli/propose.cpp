@@ -80,13 +80,13 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::ProposeRequest request;
-  *request.mutable_evidence() = comparison->evidence();
   request.set_touches(options.touches.value_or(0));
   request.set_photographs(options.photographs.value_or(0));
   const bool both = request.evidence().has_images() &&
                     request.evidence().measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET;
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
+                                *request.mutable_evidence() = comparison->evidence();
                                 return comparison->connection().diagnosis().Propose(context, request);
                               }));
 

@@ -19,9 +19,8 @@ absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
         "127.0.0.1:50052");
   RigConnection rig;
   TOUCHSTONE_ASSIGN_OR_RETURN(rig.connection, cli.Connect());
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      rig.source,
-      client::Connection::Call(&v1::Source::Stub::Describe, rig.connection->source(), v1::DescribeRequest()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rig.source,
+                              rig.connection->Call(&v1::Source::Stub::Describe, v1::DescribeRequest()));
   if (rig.source.kind() != v1::SOURCE_KIND_PHYSICAL)
     return absl::FailedPreconditionError(
         absl::StrCat(rig.connection->address(), " is a ", client::SourceKindName(rig.source.kind()),
@@ -30,7 +29,7 @@ absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
 }
 
 absl::StatusOr<v1::RigState> GetRig(client::Connection* connection) {
-  return client::Connection::Call(&v1::Rig::Stub::GetRig, connection->rig(), v1::GetRigRequest());
+  return connection->Call(&v1::Rig::Stub::GetRig, v1::GetRigRequest());
 }
 
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
@@ -53,9 +52,8 @@ absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>
     while (stop < wanted.size() && stop - first < kChecksARequest &&
            (*rows)[wanted[stop]].touch.object == request.object())
       *request.add_touches() = (*rows)[wanted[stop++]].touch.commanded;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        v1::CheckTouchesResponse response,
-        client::Connection::Call(&v1::Rig::Stub::CheckTouches, connection->rig(), request));
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::CheckTouchesResponse response,
+                                connection->CallOnce(&v1::Rig::Stub::CheckTouches, request));
     if (static_cast<size_t>(response.checks_size()) != stop - first)
       return absl::InternalError(
           absl::StrCat("the source checked ", response.checks_size(), " of ", stop - first, " touches"));

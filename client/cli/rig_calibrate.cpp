@@ -220,8 +220,7 @@ std::string InMillimetres(const Eigen::Vector3d& metres) {
 
 absl::StatusOr<v1::Object> FindObject(client::Connection* connection, const std::string& name) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse objects,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection->source(),
-                                                       v1::ListObjectsRequest()));
+                              connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   std::vector<std::string> names;
   for (const v1::Object& object : objects.objects()) {
     if (object.name() == name) return object;

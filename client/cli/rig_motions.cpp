@@ -53,14 +53,12 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
 absl::Status RunReset(const Cli& cli, const MotionCommandOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State before,
-                              client::Connection::Call(&v1::Control::Stub::GetState,
-                                                       rig.connection->control(), v1::GetStateRequest()));
+                              rig.connection->Call(&v1::Control::Stub::GetState, v1::GetStateRequest()));
   v1::ResetRequest request;
   request.set_holder(client::LeaseHolder());
   request.set_reason(options.reason);
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::State state,
-      client::Connection::Call(&v1::Control::Stub::Reset, rig.connection->control(), request));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state,
+                              rig.connection->CallOnce(&v1::Control::Stub::Reset, request));
   const std::string word = client::SourceStateWord(state.state());
   if (cli.output().json) PrintJson({{"state", word}, {"released", before.stop_reason()}});
   cli.Log(before.stop_reason().empty()

@@ -106,8 +106,7 @@ class Photos {
   absl::Status PlanSequence() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const v1::ListObjectsResponse objects,
-        client::Connection::Call(&v1::Source::Stub::ListObjects, rig_.connection->source(),
-                                 v1::ListObjectsRequest()));
+        rig_.connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
     std::vector<std::string> names;
     const v1::Object* object = nullptr;
     for (const v1::Object& known : objects.objects()) {
@@ -171,9 +170,8 @@ class Photos {
       asked.push_back(&view);
     }
     if (asked.empty()) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const v1::CheckTouchesResponse response,
-        client::Connection::Call(&v1::Rig::Stub::CheckViews, rig_.connection->rig(), request));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::CheckTouchesResponse response,
+                                rig_.connection->CallOnce(&v1::Rig::Stub::CheckViews, request));
     if (response.checks_size() != static_cast<int>(asked.size()))
       return absl::InternalError(
           absl::StrCat("the rig answered ", response.checks_size(), " checks of ", asked.size(), " views"));

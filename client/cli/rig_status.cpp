@@ -132,9 +132,8 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
 
 absl::Status PrintState(const Cli& cli, client::Connection* connection) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState rig, GetRig(connection));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::State state,
-      client::Connection::Call(&v1::Control::Stub::GetState, connection->control(), v1::GetStateRequest()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state,
+                              connection->Call(&v1::Control::Stub::GetState, v1::GetStateRequest()));
   if (!cli.output().json) return cli.Print(StateText(rig, state));
   google::protobuf::util::JsonPrintOptions print;
   print.always_print_primitive_fields = true;

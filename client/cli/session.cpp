@@ -197,9 +197,8 @@ absl::StatusOr<std::vector<v1::Session>> ListSessions(client::Connection* connec
   v1::ListSessionsRequest request;
   request.set_deleted(deleted);
   do {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        v1::ListSessionsResponse page,
-        client::Connection::Call(&v1::Sessions::Stub::ListSessions, connection->sessions(), request));
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::ListSessionsResponse page,
+                                connection->Call(&v1::Sessions::Stub::ListSessions, request));
     for (v1::Session& session : *page.mutable_sessions()) sessions.push_back(std::move(session));
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
@@ -250,9 +249,8 @@ absl::Status RunShow(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
   v1::GetSessionRequest request;
   request.set_name(options.name);
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::Session session,
-      client::Connection::Call(&v1::Sessions::Stub::GetSession, connection->sessions(), request));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Session session,
+                              connection->Call(&v1::Sessions::Stub::GetSession, request));
   if (cli.output().json) {
     PrintJson(SessionJson(session));
     return absl::OkStatus();

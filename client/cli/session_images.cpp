@@ -116,19 +116,21 @@ absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const st
   return session;
 }
 
-absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connection, const std::string& name,
-                                                    std::string* left_out) {
+namespace {
+
+absl::StatusOr<service::StoredSession> FetchOnce(client::Connection* connection,
+                                                 const v1::ExportSessionRequest& request,
+                                                 std::string* left_out) {
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
-  v1::ExportSessionRequest request;
-  request.set_name(name);
   const auto reader = connection->sessions().ExportSession(&context, request);
   v1::ExportSessionResponse response;
   service::SessionPieces pieces;
   absl::Status wrong;
   while (wrong.ok() && reader->Read(&response)) wrong = pieces.Append(response.file(), response.csv());
   if (!wrong.ok()) context.TryCancel();
-  const absl::Status finished = client::FromGrpc(reader->Finish());
+  absl::Status finished = client::FromGrpc(reader->Finish());
+  if (!Interrupt::Raised()) finished = client::LostWhereCancelled(finished);
   TOUCHSTONE_RETURN_IF_ERROR(wrong);
   TOUCHSTONE_RETURN_IF_ERROR(finished);
   const auto& trailing = context.GetServerTrailingMetadata();
@@ -136,6 +138,20 @@ absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connecti
     left_out->assign(words->second.data(), words->second.size());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, pieces.Take());
   return service::UnpackSession(bytes);
+}
+
+}  // namespace
+
+absl::StatusOr<service::StoredSession> FetchSession(client::Connection* connection, const std::string& name,
+                                                    std::string* left_out) {
+  v1::ExportSessionRequest request;
+  request.set_name(name);
+  absl::StatusOr<service::StoredSession> session;
+  TOUCHSTONE_RETURN_IF_ERROR(connection->Retrying([&] {
+    session = FetchOnce(connection, request, left_out);
+    return session.status();
+  }));
+  return session;
 }
 
 absl::Status WriteExportedSession(const Cli& cli, const std::string& name,

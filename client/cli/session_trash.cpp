@@ -31,8 +31,7 @@ absl::StatusOr<LeasedServer> ConnectWithLease(const Cli& cli, const TrashOptions
   LeasedServer server;
   TOUCHSTONE_ASSIGN_OR_RETURN(server.connection, cli.Connect());
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::DescribeResponse source,
-                              client::Connection::Call(&v1::Source::Stub::Describe,
-                                                       server.connection->source(), v1::DescribeRequest()));
+                              server.connection->Call(&v1::Source::Stub::Describe, v1::DescribeRequest()));
   client::LeaseOptions lease;
   lease.take = options.lease.take_lease;
   TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -75,8 +74,7 @@ absl::Status RunDelete(const Cli& cli, const TrashOptions& options) {
   request.set_lease_token(server.lease->token());
   request.set_purge(options.purge);
   TOUCHSTONE_RETURN_IF_ERROR(
-      client::Connection::Call(&v1::Sessions::Stub::DeleteSession, server.connection->sessions(), request)
-          .status());
+      server.connection->CallOnce(&v1::Sessions::Stub::DeleteSession, request).status());
   cli.Log(Deleted(options, options.name, server.lease->required()));
   return absl::OkStatus();
 }
@@ -94,8 +92,7 @@ absl::Status RunRestore(const Cli& cli, const TrashOptions& options) {
     request.set_name(options.name);
     request.set_lease_token(server.lease->token());
     TOUCHSTONE_RETURN_IF_ERROR(
-        client::Connection::Call(&v1::Sessions::Stub::RestoreSession, server.connection->sessions(), request)
-            .status());
+        server.connection->CallOnce(&v1::Sessions::Stub::RestoreSession, request).status());
   }
   cli.Log(absl::StrCat("restored ", restored));
   return absl::OkStatus();

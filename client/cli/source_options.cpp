@@ -4,6 +4,7 @@
 #include "client/cli/common.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/channel.h"
 
 namespace touchstone::cli {
 namespace {
@@ -111,9 +112,10 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
           absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
     options.credentials = client::WithEnvironment(source_.credentials);
     options.wait_s = source_.wait_s;
-    options.on_wait = [this](const std::string& line) { Log(line); };
+    options.log = [this](const std::string& line) { Log(line); };
     TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
-    Detail("connected to " + connection->address());
+    const std::string proxy = service::ProxyFor(connection->address());
+    Detail(absl::StrCat("connected to ", connection->address(), proxy.empty() ? "" : " through ", proxy));
     return connection;
   }
   const client::Credentials& shown = source_.credentials;

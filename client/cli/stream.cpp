@@ -45,8 +45,7 @@ constexpr uint64_t kDefaultSamples = 1000;
 // The objects of the source, for "all".
 absl::StatusOr<std::vector<std::string>> AllObjects(client::Connection* connection) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse response,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection->source(),
-                                                       v1::ListObjectsRequest()));
+                              connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   std::vector<std::string> names;
   for (const v1::Object& object : response.objects()) names.push_back(object.name());
   return names;

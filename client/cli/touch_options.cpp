@@ -98,8 +98,7 @@ void AimAtObject(const TouchFlags& options, const geometry::Bounds& bounds, cons
 
 absl::StatusOr<geometry::Bounds> BoundsOfObject(client::Connection* connection, const std::string& object) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse response,
-                              client::Connection::Call(&v1::Source::Stub::ListObjects, connection->source(),
-                                                       v1::ListObjectsRequest()));
+                              connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   std::vector<std::string> known;
   for (const v1::Object& candidate : response.objects()) {
     if (candidate.name() == object)

@@ -1,4 +1,5 @@
-// touchstone-probe: asks a server's standard health check, for containers and units that have no other client.
+// touchstone-probe: asks a server's standard health check, for containers and units that have no other client. It asks the
+// server itself and never a proxy.
 // Exit codes: 0 serving, 2 usage or bad input, 3 unreachable, 4 not serving.
 #include <grpcpp/grpcpp.h>
 
@@ -10,6 +11,7 @@
 
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/base/text.h"
+#include "server/service/channel.h"
 
 namespace {
 
@@ -44,7 +46,8 @@ int Probe(const ProbeOptions& options) {
     credentials = grpc::SslCredentials(tls);
     if (!options.server_name.empty()) arguments.SetSslTargetNameOverride(options.server_name);
   }
-  const auto channel = grpc::CreateCustomChannel(options.address, credentials, arguments);
+  const auto channel = touchstone::service::OpenChannel(options.address, credentials, arguments, {},
+                                                        touchstone::service::ProxyUse::kNever);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +
                        std::chrono::milliseconds(static_cast<int64_t>(options.timeout_s * 1000)));
@@ -61,8 +64,9 @@ int Probe(const ProbeOptions& options) {
 int main(int argc, char** argv) {
   ProbeOptions options;
   CLI::App app{
-      "Asks a server's or gateway's standard gRPC health check. Exit codes: 0 serving, 2 usage or bad "
-      "input,\n"
+      "Asks a server's or gateway's standard gRPC health check, never through a proxy. Exit codes: 0 "
+      "serving, "
+      "2 usage or bad input,\n"
       "3 unreachable, 4 not serving.",
       "touchstone-probe"};
   app.add_option("ADDRESS", options.address, "HOST:PORT. Default: 127.0.0.1:50051");

@@ -5,16 +5,18 @@
 #include <absl/strings/str_join.h>
 
 #include <chrono>
-#include <thread>
 
 #include "client/source/tls_probe.h"
 #include "server/base/status.h"
+#include "server/service/channel.h"
 #include "server/service/host_port.h"
 
 namespace touchstone::client {
 namespace {
 
-constexpr std::chrono::milliseconds kRetryInterval{100};
+int Milliseconds(double seconds) {
+  return static_cast<int>(1e3 * seconds);
+}
 
 std::chrono::system_clock::time_point InSeconds(double seconds) {
   return std::chrono::system_clock::now() +
@@ -85,16 +87,44 @@ Connection::~Connection() {
 }
 
 absl::Status Connection::ConnectToOneThatStarts() {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.wait_s);
+  Retry retry(server_count(), options_.wait_s, *options_.clock);
   for (bool waiting = false;; waiting = true) {
     const absl::Status status = ConnectToNext();
-    if (!absl::IsUnavailable(status) || std::chrono::steady_clock::now() + kRetryInterval > end)
-      return status;
-    if (!waiting && options_.on_wait)
-      options_.on_wait(absl::StrCat("waiting for ", absl::StrJoin(options_.servers, " or "),
-                                    " to answer, up to ", options_.wait_s, " s"));
-    std::this_thread::sleep_for(kRetryInterval);
+    if (!absl::IsUnavailable(status)) return status;
+    const std::optional<double> pause_s = retry.PauseAfter(server_count());
+    if (!pause_s) return status;
+    if (!waiting && options_.log)
+      options_.log(absl::StrCat("waiting for ", absl::StrJoin(options_.servers, " or "), " to answer, up to ",
+                                options_.wait_s, " s"));
+    options_.clock->SleepFor(*pause_s);
   }
+}
+
+absl::Status Connection::Retrying(const std::function<absl::Status()>& attempt, const RetryOptions& options) {
+  return RetryingAfter(attempt(), attempt, options);
+}
+
+absl::Status Connection::RetryingAfter(absl::Status status, const std::function<absl::Status()>& attempt,
+                                       const RetryOptions& options) {
+  const auto worth_it = [&] { return IsLostServer(status) || IsFullServer(status); };
+  if (embedded() || !worth_it()) return status;
+  const Clock& clock = options.clock != nullptr ? *options.clock : *options_.clock;
+  const auto& log = options.log ? options.log : options_.log;
+  if (log) log(absl::StrCat("lost ", address_, ": ", status.message()));
+  Retry retry(server_count(), options.retry_for_s.value_or(options_.retry_for_s), clock);
+  int tried = 1;
+  while (worth_it()) {
+    const std::optional<double> pause_s = retry.PauseAfter(tried);
+    if (!pause_s) return status;
+    if (!options.wait)
+      clock.SleepFor(*pause_s);
+    else if (!options.wait(*pause_s))
+      return absl::CancelledError("nobody waits for another server any more");
+    status = ConnectToNext();
+    tried = status.ok() ? 1 : server_count();
+    if (status.ok()) status = attempt();
+  }
+  return status;
 }
 
 absl::Status Connection::ConnectToNext() {
@@ -122,23 +152,35 @@ absl::Status Connection::Connect(int server_index) {
   arguments.SetMaxSendMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  // A server whose machine died sends nothing: ask for a sign of life, so that a stream does not
-  // wait for ever.
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  // By its name this is the least time between two attempts; it is also how long an attempt may take, 20 s by itself. The first
+  // one is ended below, just before.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, Milliseconds(1.25 * options_.connect_timeout_s));
+  // A server that was stopped, or whose machine died, sends nothing: it is asked for a sign of life during every call, also
+  // where it computes for long and sends no data.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(kKeepaliveS));
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(kKeepaliveTimeoutS));
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   // A name may stand for many equal servers: every call goes to the next one of its addresses that answers.
   if (absl::StartsWith(address, "dns:")) arguments.SetLoadBalancingPolicyName("round_robin");
   TOUCHSTONE_ASSIGN_OR_RETURN(auto channel, MakeChannel(address, options_.credentials, arguments));
-  const auto failed = [&](const std::string& how) {
-    const std::string why = ExplainTlsFailure(address, options_.credentials);
-    return why.empty() ? absl::UnavailableError(how) : absl::InvalidArgumentError(why);
+  const std::string proxy = service::ProxyFor(address);
+  const auto unavailable = [&](const std::string& how) {
+    return absl::UnavailableError(
+        proxy.empty() ? how
+                      : absl::StrCat(how, " through ", proxy, "; hosts in no_proxy are reached without it"));
   };
-  // Refused at once is an answer too: the next server should not wait for the whole time-out.
   const auto deadline = InSeconds(options_.connect_timeout_s);
   for (grpc_connectivity_state state; (state = channel->GetState(true)) != GRPC_CHANNEL_READY;) {
-    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE) return failed(absl::StrCat("no connection to ", address));
+    // Refused at once is an answer too: the next server should not wait for the whole time-out.
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE) {
+      // A TLS handshake of our own would go to the server itself, which only the proxy may reach.
+      const std::string why = proxy.empty() ? ExplainTlsFailure(address, options_.credentials) : "";
+      return why.empty() ? unavailable(absl::StrCat("no connection to ", address))
+                         : absl::InvalidArgumentError(why);
+    }
     if (!channel->WaitForStateChange(state, deadline))
-      return failed(absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
+      return unavailable(
+          absl::StrCat("no answer from ", address, " within ", options_.connect_timeout_s, " s"));
   }
   server_index_ = server_index;
   address_ = address;

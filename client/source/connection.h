@@ -4,7 +4,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <absl/status/statusor.h>
@@ -13,6 +15,8 @@
 
 #include "client/source/credentials.h"
 #include "client/source/errors.h"
+#include "client/source/retry.h"
+#include "server/base/clock.h"
 #include "server/service/server.h"
 #include "server/service/server_options.h"
 #include "touchstone/v1/control.grpc.pb.h"
@@ -35,12 +39,22 @@ inline const char* SourceKindName(v1::SourceKind kind) {
 inline constexpr int kMaxMessageBytes = 256 << 20;
 
 struct ConnectionOptions {
-  std::vector<std::string> servers;  // "host:port"; tried in this order; none: a source in this process
-  Credentials credentials;           // what they are shown
-  service::ServerOptions embedded;   // of the source in this process; `listen` is ignored
-  double connect_timeout_s = 5;      // for one server
-  double wait_s = 0;                 // Open tries again for so long while none answers: one may be starting
-  std::function<void(const std::string&)> on_wait;  // called once, with what is waited for; may be null
+  std::vector<std::string> servers;      // "host:port"; tried in this order; none: a source in this process
+  Credentials credentials;               // what they are shown
+  service::ServerOptions embedded;       // of the source in this process; `listen` is ignored
+  double connect_timeout_s = kConnectS;  // for one server
+  double wait_s = 0;                // Open tries again for so long while none answers: one may be starting
+  double retry_for_s = kRetryForS;  // a server that was lost later
+  const Clock* clock = &SteadyClock();          // of the waits between two attempts; outlives the connection
+  std::function<void(const std::string&)> log;  // what is waited for, and lost servers; may be null
+};
+
+// How one thing is tried again. What is not set here is that of the connection.
+struct RetryOptions {
+  std::optional<double> retry_for_s;
+  const Clock* clock = nullptr;
+  std::function<bool(double seconds)> wait;  // false: nobody wants it any more
+  std::function<void(const std::string&)> log;
 };
 
 // Not safe for use by several threads at once, apart from the stubs, which are.
@@ -69,20 +83,48 @@ class Connection {
   // that is tried. For a source in this process: an error, since it cannot be lost.
   absl::Status ConnectToNext();
 
-  // One unary call: Call(&v1::Source::Stub::Describe, connection.source(), request).
+  // One unary call, made again where it was lost: connection.Call(&v1::Source::Stub::Describe, request).
   template <typename Stub, typename Request, typename Response>
-  static absl::StatusOr<Response> Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
-                                                                    Response*),
-                                       Stub& stub, const Request& request) {
+  absl::StatusOr<Response> Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                                const Request& request) {
+    absl::StatusOr<Response> response;
+    const absl::Status status = Retrying([&] {
+      response = CallOnce(method, request);
+      return LostWhereCancelled(response.status());
+    });
+    if (!status.ok()) return status;
+    return response;
+  }
+  // For what may not be done twice (deletions, the release of a stop), and for a rig's checks, where UNAVAILABLE says that its
+  // arm is not there.
+  template <typename Stub, typename Request, typename Response>
+  absl::StatusOr<Response> CallOnce(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                                 Response*),
+                                    const Request& request) {
     grpc::ClientContext context;
     Response response;
-    const absl::Status status = FromGrpc((stub.*method)(&context, request, &response));
+    const absl::Status status = FromGrpc((StubOf<Stub>().*method)(&context, request, &response));
     if (!status.ok()) return status;
     return response;
   }
 
+  // Runs `attempt`, and again at the next server, while it is lost or full, as retry.h says; the last status. A loss that the
+  // caller found goes in as `lost`.
+  absl::Status Retrying(const std::function<absl::Status()>& attempt, const RetryOptions& options = {});
+  absl::Status RetryingAfter(absl::Status lost, const std::function<absl::Status()>& attempt,
+                             const RetryOptions& options = {});
+
  private:
   Connection() = default;
+  template <typename Stub>
+  Stub& StubOf() {
+    if constexpr (std::is_same_v<Stub, v1::Source::Stub>) return *source_;
+    if constexpr (std::is_same_v<Stub, v1::Models::Stub>) return *models_;
+    if constexpr (std::is_same_v<Stub, v1::Control::Stub>) return *control_;
+    if constexpr (std::is_same_v<Stub, v1::Sessions::Stub>) return *sessions_;
+    if constexpr (std::is_same_v<Stub, v1::Diagnosis::Stub>) return *diagnosis_;
+    if constexpr (std::is_same_v<Stub, v1::Rig::Stub>) return *rig_;
+  }
   absl::Status Connect(int server_index);
   absl::Status ConnectToOneThatStarts();
   void MakeStubs();

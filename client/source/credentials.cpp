@@ -2,7 +2,6 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
-#include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
 
@@ -11,7 +10,8 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/access_options.h"
+#include "server/service/channel.h"
+#include "server/service/host_port.h"
 
 namespace touchstone::client {
 namespace {
@@ -116,18 +116,17 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& ad
                                                            const Credentials& credentials,
                                                            const grpc::ChannelArguments& arguments) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto channel_credentials, ChannelCredentialsOf(credentials));
-  if (credentials.token.empty() && credentials.token_file.empty())
-    return grpc::CreateCustomChannel(address, channel_credentials, arguments);
-  TOUCHSTONE_RETURN_IF_ERROR(TokenOf(credentials).status());
-  if (!credentials.tls() && !service::IsLocalAddress(address))
-    return absl::InvalidArgumentError(
-        absl::StrCat("a token would go to ", address,
-                     " in plain text, where others can read it: give the CA of the server's "
-                     "certificate with --tls-ca FILE (or --tls-ca system), or leave the token out"));
-  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
-  interceptors.push_back(std::make_unique<TokenInterceptors>(credentials));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, channel_credentials, arguments,
-                                                                 std::move(interceptors));
+  service::Interceptors interceptors;
+  if (!credentials.token.empty() || !credentials.token_file.empty()) {
+    TOUCHSTONE_RETURN_IF_ERROR(TokenOf(credentials).status());
+    if (!credentials.tls() && !service::IsLocalAddress(address))
+      return absl::InvalidArgumentError(
+          absl::StrCat("a token would go to ", address,
+                       " in plain text, where others can read it: give the CA of the server's "
+                       "certificate with --tls-ca FILE (or --tls-ca system), or leave the token out"));
+    interceptors.push_back(std::make_unique<TokenInterceptors>(credentials));
+  }
+  return service::OpenChannel(address, channel_credentials, arguments, std::move(interceptors));
 }
 
 }  // namespace touchstone::client

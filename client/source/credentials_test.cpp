@@ -54,8 +54,7 @@ class CredentialsTest : public testing::Test {
     return std::string(status.message());
   }
   static absl::Status Describe(Connection* connection) {
-    return Connection::Call(&v1::Source::Stub::Describe, connection->source(), v1::DescribeRequest())
-        .status();
+    return connection->Call(&v1::Source::Stub::Describe, v1::DescribeRequest()).status();
   }
 
   service::TestCertificates files_;
@@ -77,8 +76,7 @@ TEST_F(CredentialsTest, ATokenIsShownAndReadAgain) {
   EXPECT_EQ(Describe(connection->get()).code(), absl::StatusCode::kUnauthenticated);
   std::ofstream(files_.Path("token")) << next;
   EXPECT_TRUE(Describe(connection->get()).ok());
-  const auto refused =
-      Connection::Call(&v1::Models::Stub::CreateModel, (*connection)->models(), v1::CreateModelRequest());
+  const auto refused = (*connection)->Call(&v1::Models::Stub::CreateModel, v1::CreateModelRequest());
   EXPECT_THAT(std::string(refused.status().message()), HasSubstr("Models.CreateModel needs the role admin"));
 }
 

@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
@@ -48,9 +47,7 @@ absl::StatusOr<std::unique_ptr<DatasetStream>> DatasetStream::Open(Connection* c
                                                                    DatasetStreamOptions options) {
   std::unique_ptr<DatasetStream> stream(
       new DatasetStream(connection, std::move(request), std::move(options)));
-  absl::Status status = stream->Start();
-  if (IsLostServer(status)) status = stream->Reconnect(status);
-  TOUCHSTONE_RETURN_IF_ERROR(status);
+  TOUCHSTONE_RETURN_IF_ERROR(stream->Reconnect(stream->Start()));
   return stream;
 }
 
@@ -102,40 +99,33 @@ absl::StatusOr<bool> DatasetStream::Next(Batch* batch) {
     if (absl::IsAborted(status) && options_.lease != nullptr && !options_.lease->status().ok())
       return options_.lease->status();
     // Nobody here has cancelled: the server ended what was left of a drain, or a stream that nobody read for long.
-    if (!IsLostServer(status) && !absl::IsCancelled(status)) return status;
+    const absl::Status lost = LostWhereCancelled(status);
+    if (!IsLostServer(lost) && !IsFullServer(lost)) return status;
     // Lost after the last batch but before the goodbye: there is nothing left to ask for.
     const uint64_t stop = request_.stop_index() > 0 ? request_.stop_index() : header_.samples();
     if (request_.start_index() >= stop) return false;
-    TOUCHSTONE_RETURN_IF_ERROR(Reconnect(status));
+    TOUCHSTONE_RETURN_IF_ERROR(Reconnect(lost));
   }
 }
 
 absl::Status DatasetStream::Reconnect(absl::Status lost) {
-  if (connection_->embedded() || options_.reconnect_s <= 0) return lost;
-  if (options_.log) options_.log(absl::StrCat("lost ", connection_->address(), ": ", lost.message()));
-  const Clock& clock = *options_.clock;
-  const Clock::Time start = clock.Now();
-  double backoff_s = kFirstBackoffS;
-  while (true) {
-    absl::Status status = connection_->ConnectToNext();
-    if (status.ok() && options_.lease != nullptr) status = options_.lease->Follow(connection_);
-    if (status.ok()) status = Start();
-    if (status.ok()) {
-      if (options_.log)
-        options_.log(
-            absl::StrCat("resuming at ", connection_->address(), " with sample ", request_.start_index()));
-      return status;
-    }
-    // A server that is full may have room soon; anything else will not get better by waiting.
-    if (!IsLostServer(status) && !IsFullServer(status)) return status;
-    if (clock.SecondsSince(start) + backoff_s > options_.reconnect_s) return status;
-    {
-      std::unique_lock<std::mutex> lock(context_mutex_);
-      if (clock.WaitFor(lock, cancellation_, backoff_s, [this] { return cancelled_.load(); }))
-        return absl::CancelledError("the stream was cancelled");
-    }
-    backoff_s = NextBackoffS(backoff_s);
-  }
+  RetryOptions retry;
+  retry.retry_for_s = options_.reconnect_s;
+  retry.clock = options_.clock;
+  retry.log = options_.log;
+  retry.wait = [this](double seconds) {
+    std::unique_lock<std::mutex> lock(context_mutex_);
+    return !options_.clock->WaitFor(lock, cancellation_, seconds, [this] { return cancelled_.load(); });
+  };
+  const auto attempt = [this] {
+    if (options_.lease != nullptr) TOUCHSTONE_RETURN_IF_ERROR(options_.lease->Follow(connection_));
+    TOUCHSTONE_RETURN_IF_ERROR(Start());
+    if (options_.log)
+      options_.log(
+          absl::StrCat("resuming at ", connection_->address(), " with sample ", request_.start_index()));
+    return absl::OkStatus();
+  };
+  return connection_->RetryingAfter(std::move(lost), attempt, retry);
 }
 
 absl::Status DatasetStream::CloseReader() {

@@ -21,7 +21,7 @@ namespace touchstone::client {
 struct DatasetStreamOptions {
   // A lost server is looked for, there and at the others, for this long since the last batch; then the stream
   // fails with UNAVAILABLE.
-  double reconnect_s = 60;
+  double reconnect_s = kRetryForS;
   const Clock* clock = &SteadyClock();  // outlives the stream
   // Called from the reading thread when a server was lost and when the stream resumes.
   std::function<void(const std::string&)> log;
@@ -50,9 +50,9 @@ class DatasetStream {
 
  private:
   DatasetStream(Connection* connection, v1::StreamDatasetRequest request, DatasetStreamOptions options);
-  absl::Status Start();  // one try: sends the request, reads and compares the header
-  absl::Status Reconnect(absl::Status lost);
-  absl::Status CloseReader();  // the stream's final status
+  absl::Status Start();                       // one try: sends the request, reads and compares the header
+  absl::Status Reconnect(absl::Status lost);  // nothing where it is no loss
+  absl::Status CloseReader();                 // the stream's final status
 
   Connection* connection_;
   v1::StreamDatasetRequest request_;  // start_index moves on with every batch

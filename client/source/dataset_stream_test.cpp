@@ -12,6 +12,8 @@
 
 #include "client/source/errors.h"
 #include "server/base/manual_clock.h"
+#include "server/base/test_tier.h"
+#include "server/service/server.h"
 
 namespace touchstone::client {
 namespace {
@@ -231,6 +233,33 @@ TEST(DatasetStream, CancelEndsItFromAnotherThread) {
   const auto all = ReadAll(stream->get());
   canceller.join();
   EXPECT_EQ(all.status().code(), absl::StatusCode::kCancelled);
+}
+
+// Between two reads nobody looks at the connection but gRPC itself, every 5 s: signs of life are answered in time all the same,
+// and the server takes so many of them for no attack.
+TEST(DatasetStream, IsNotLostWhereItsReaderIsSlow) {
+  TOUCHSTONE_SECOND_TIER("long: longer than a sign of life may take");
+  service::ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.supershape_triangles = 500;
+  const auto server = service::Server::Start(options).value();
+  const auto connection = Connect({"127.0.0.1:" + std::to_string(server->port())});
+  v1::StreamDatasetRequest request = Request(500);
+  request.mutable_spec()->add_objects("lat00");
+  request.mutable_spec()->mutable_plan()->mutable_sphere();
+  request.mutable_spec()->set_samples(1'000'000);
+  request.mutable_spec()->add_columns("index");
+  request.mutable_spec()->add_columns("pose");
+  std::vector<std::string> losses;
+  DatasetStreamOptions how;
+  how.log = [&](const std::string& line) { losses.push_back(line); };
+  auto stream = DatasetStream::Open(connection.get(), request, how);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  Batch batch;
+  ASSERT_TRUE((*stream)->Next(&batch).value());
+  std::this_thread::sleep_for(std::chrono::duration<double>(2 * (kKeepaliveS + kKeepaliveTimeoutS)));
+  for (int k = 0; k < 1000; ++k) ASSERT_TRUE((*stream)->Next(&batch).value());
+  EXPECT_THAT(losses, testing::IsEmpty());
 }
 
 TEST(Connection, SaysWhichServersDidNotAnswer) {

@@ -30,7 +30,7 @@ struct DatasetJob {
   uint64_t job_index = 0;
   uint64_t job_count = 1;
   bool restart = false;  // forget what the folder holds of a dataset
-  double reconnect_s = 60;
+  double reconnect_s = kRetryForS;
   std::string session;           // that a physical source journals the touches in; empty: its default
   LeaseKeeper* lease = nullptr;  // of a source that needs one; outlives the job
 };

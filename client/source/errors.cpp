@@ -15,7 +15,16 @@ absl::Status FromGrpc(const grpc::Status& status) {
 }
 
 bool IsLostServer(const absl::Status& status) {
-  return absl::IsUnavailable(status);
+  if (absl::IsUnavailable(status)) return true;
+  // A killed server also shows as a stream that was reset.
+  if (!absl::IsInternal(status) && !absl::IsUnknown(status)) return false;
+  for (const char* words : {"RST_STREAM", "Stream removed", "Socket closed"})
+    if (absl::StrContains(status.message(), words)) return true;
+  return false;
+}
+
+absl::Status LostWhereCancelled(const absl::Status& status) {
+  return absl::IsCancelled(status) ? absl::UnavailableError(status.message()) : status;
 }
 
 bool IsFullServer(const absl::Status& status) {

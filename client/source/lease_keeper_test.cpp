@@ -30,9 +30,7 @@ class LeaseKeeperTest : public ::testing::Test {
     connection_ = *std::move(connection);
     needs_lease_.set_lease_required(true);
   }
-  v1::State State() {
-    return *Connection::Call(&v1::Control::Stub::GetState, connection_->control(), v1::GetStateRequest());
-  }
+  v1::State State() { return *connection_->Call(&v1::Control::Stub::GetState, v1::GetStateRequest()); }
   absl::StatusOr<std::unique_ptr<LeaseKeeper>> Acquire(const std::string& holder, bool take = false) {
     LeaseOptions options;
     options.holder = holder;
@@ -47,8 +45,7 @@ class LeaseKeeperTest : public ::testing::Test {
 };
 
 TEST_F(LeaseKeeperTest, DoesNothingAtASourceThatNeedsNone) {
-  const auto source =
-      Connection::Call(&v1::Source::Stub::Describe, connection_->source(), v1::DescribeRequest());
+  const auto source = connection_->Call(&v1::Source::Stub::Describe, v1::DescribeRequest());
   ASSERT_TRUE(source.ok());
   const auto keeper = LeaseKeeper::Acquire(connection_.get(), *source);
   ASSERT_TRUE(keeper.ok()) << keeper.status();
@@ -127,7 +124,7 @@ TEST_F(LeaseKeeperTest, FollowsToANewLeaseOnceTheOldOneIsFree) {
   const std::string before = (*ana)->token();
   v1::ReleaseLeaseRequest release;
   release.set_token(before);
-  ASSERT_TRUE(Connection::Call(&v1::Control::Stub::ReleaseLease, connection_->control(), release).ok());
+  ASSERT_TRUE(connection_->Call(&v1::Control::Stub::ReleaseLease, release).ok());
   clock_.PassUntil([&] { return !(*ana)->status().ok(); });
   ASSERT_TRUE((*ana)->Follow(connection_.get()).ok());
   EXPECT_TRUE((*ana)->status().ok());

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <thread>
 
-#include "client/source/backoff.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
@@ -19,9 +18,8 @@ constexpr std::chrono::seconds kStopAnswer{2};
 absl::StatusOr<std::unique_ptr<LeasedSource>> LeasedSource::Open(Connection* connection,
                                                                  LeasedSourceOptions options) {
   std::unique_ptr<LeasedSource> source(new LeasedSource(connection, std::move(options)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      source->description_,
-      Connection::Call(&v1::Source::Stub::Describe, connection->source(), v1::DescribeRequest()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->description_,
+                              connection->Call(&v1::Source::Stub::Describe, v1::DescribeRequest()));
   source->channel_ = connection->channel();
   LeaseOptions lease;
   lease.take = source->options_.take_lease;
@@ -59,13 +57,32 @@ absl::StatusOr<Response> LeasedSource::Call(Stub& stub,
   return response;
 }
 
+template <typename Request, typename Response>
+absl::StatusOr<Response> LeasedSource::CallAgain(
+    grpc::Status (v1::Source::Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+    Request* request) {
+  RetryOptions retry;
+  retry.retry_for_s = options_.reconnect_s;
+  retry.clock = options_.clock;
+  retry.wait = [this](double seconds) { return SleepFor(seconds).ok(); };
+  retry.log = options_.log;
+  absl::StatusOr<Response> response;
+  TOUCHSTONE_RETURN_IF_ERROR(connection_->Retrying(
+      [&] {
+        response = Call(connection_->source(), method, request);
+        return response.status();
+      },
+      retry));
+  return response;
+}
+
 absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) {
-  const Clock::Time start = options_.clock->Now();
-  double backoff_s = kFirstBackoffS;
+  Retry retry(connection_->server_count(), options_.reconnect_s, *options_.clock);
   bool again = false;
   while (true) {
     absl::StatusOr<v1::TouchResponse> response =
-        Call(connection_->source(), &v1::Source::Stub::Touch, &request);
+        lease_->required() ? Call(connection_->source(), &v1::Source::Stub::Touch, &request)
+                           : CallAgain(&v1::Source::Stub::Touch, &request);
     const int results = response.ok() ? response->results_size() : request.touches_size();
     if (results != request.touches_size())
       return absl::InternalError(
@@ -73,13 +90,13 @@ absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) 
     // Asked for again, the touch may still be under way, or the lease that of the process before.
     const bool passing = IsLostServer(response.status()) || (again && absl::IsAborted(response.status()));
     if (response.ok() || !passing) return response;
-    if (connection_->embedded() || request.touch_ids().empty()) return response;
-    if (options_.clock->SecondsSince(start) > options_.reconnect_s) return response;
+    if (!lease_->required() || request.touch_ids().empty()) return response;
+    const std::optional<double> pause_s = retry.PauseAfter(1);
+    if (!pause_s) return response;
     if (options_.log)
       options_.log(absl::StrCat(connection_->address(), ": ", response.status().message(),
                                 "; the same touch is asked for again"));
-    TOUCHSTONE_RETURN_IF_ERROR(SleepFor(backoff_s));
-    backoff_s = NextBackoffS(backoff_s);
+    TOUCHSTONE_RETURN_IF_ERROR(SleepFor(*pause_s));
     again = true;
     const absl::Status found = FindAgain();
     if (!found.ok() && !IsLostServer(found)) return found;
@@ -87,7 +104,8 @@ absl::StatusOr<v1::TouchResponse> LeasedSource::Touch(v1::TouchRequest request) 
 }
 
 absl::StatusOr<v1::CaptureResponse> LeasedSource::Capture(v1::CaptureRequest request) {
-  return Call(connection_->source(), &v1::Source::Stub::Capture, &request);
+  return lease_->required() ? Call(connection_->source(), &v1::Source::Stub::Capture, &request)
+                            : CallAgain(&v1::Source::Stub::Capture, &request);
 }
 
 absl::StatusOr<v1::RigState> LeasedSource::Mount(const std::string& object, v1::UpFace up_face) {

@@ -19,7 +19,7 @@ namespace touchstone::client {
 struct LeasedSourceOptions {
   bool take_lease = false;
   // How long a lost source is looked for before a touch fails with UNAVAILABLE.
-  double reconnect_s = 60;
+  double reconnect_s = kRetryForS;
   const Clock* clock = &SteadyClock();  // outlives the source
   // Called when a source was lost, found again, or lost its lease.
   std::function<void(const std::string&)> log;
@@ -37,7 +37,7 @@ class LeasedSource {
   size_t touches_per_request() const;
 
   // With the lease. A request with touch ids is repeated with the same ids when the source was lost, within
-  // reconnect_s; one without is not, since it is unknown which touches were made.
+  // reconnect_s; one without is not where something moves, since it is unknown which touches were made.
   absl::StatusOr<v1::TouchResponse> Touch(v1::TouchRequest request);
   absl::StatusOr<v1::CaptureResponse> Capture(v1::CaptureRequest request);
   absl::StatusOr<v1::RigState> Mount(const std::string& object, v1::UpFace up_face);
@@ -57,6 +57,11 @@ class LeasedSource {
   absl::StatusOr<Response> Call(Stub& stub,
                                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                                 Request* request);
+  // The same, made again by the connection's policy where it was lost: for sources that move nothing.
+  template <typename Request, typename Response>
+  absl::StatusOr<Response> CallAgain(grpc::Status (v1::Source::Stub::*method)(grpc::ClientContext*,
+                                                                              const Request&, Response*),
+                                     Request* request);
   absl::Status FindAgain();
   absl::Status SleepFor(double seconds);
 

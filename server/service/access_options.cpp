@@ -27,14 +27,6 @@ std::vector<Option> AccessFlags(AccessOptions* options) {
   };
 }
 
-bool IsLocalAddress(absl::string_view listen) {
-  if (listen.empty() || absl::StartsWith(listen, "unix:")) return true;
-  absl::string_view host = listen.substr(0, listen.rfind(':'));
-  if (host == "localhost" || host == "[::1]") return true;
-  // Only whole addresses: 127.evil.example is a name like any other.
-  return absl::StartsWith(host, "127.") && host.find_first_not_of("0123456789.") == absl::string_view::npos;
-}
-
 absl::Status CheckAccess(const std::string& listen, const AccessOptions& options) {
   if (options.tls_cert.empty() != options.tls_key.empty())
     return absl::InvalidArgumentError(absl::StrCat(

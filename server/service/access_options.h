@@ -5,7 +5,8 @@
 #include <vector>
 
 #include <absl/status/status.h>
-#include <absl/strings/string_view.h>
+
+#include "server/service/host_port.h"
 
 namespace touchstone::service {
 
@@ -27,9 +28,6 @@ struct AccessOptions {
 
 // Flags and keys of these.
 std::vector<Option> AccessFlags(AccessOptions* options);
-
-// Whether only this machine reaches an address: 127.0.0.0/8, [::1], localhost, unix:PATH, or no address at all.
-bool IsLocalAddress(absl::string_view listen);
 
 // That the options go together, and are enough for where the server listens. Errors say what is missing.
 absl::Status CheckAccess(const std::string& listen, const AccessOptions& options);

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <utility>
 
+#include "server/base/memory_limit.h"
 #include "server/base/over_limit.h"
 #include "server/service/limits.h"
 
@@ -20,17 +21,6 @@ uint64_t ResidentBytes() {
   uint64_t pages = 0, resident = 0;
   std::ifstream("/proc/self/statm") >> pages >> resident;
   return resident * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
-}
-
-// Of the machine, or of the container where that has less.
-uint64_t MachineBytes() {
-  uint64_t bytes =
-      static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
-  for (const char* file : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
-    uint64_t limit = 0;  // "max" is no number
-    if (std::ifstream(file) >> limit && limit > 0) bytes = std::min(bytes, limit);
-  }
-  return bytes;
 }
 
 constexpr double kSavedS = 5;            // of calls that were not made
@@ -99,7 +89,7 @@ absl::Status CallRate::Take(const std::string& client) {
 }
 
 MemoryBudget::MemoryBudget(int max_mib)
-    : max_bytes_(max_mib > 0 ? max_mib * kMebibyte : MachineBytes() / 2) {}
+    : max_bytes_(max_mib > 0 ? max_mib * kMebibyte : MemoryLimitBytes() / 2) {}
 
 void MemoryBudget::Begin() {
   // What was freed before may be given back later, and would then look like room.

@@ -83,7 +83,7 @@ class CallRate {
 // What the process may use beyond what it has when it begins to serve. Thread-safe.
 class MemoryBudget {
  public:
-  // 0: half of the memory of the machine or, where that is less, of the container.
+  // 0: half of what the process may have (MemoryLimitBytes).
   explicit MemoryBudget(int max_mib);
   // What is resident now belongs to no client.
   void Begin();

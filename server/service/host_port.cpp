@@ -1,11 +1,27 @@
 #include "server/service/host_port.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/numbers.h>
+#include <absl/strings/str_split.h>
+#include <absl/strings/strip.h>
+#include <arpa/inet.h>
 
 #include <algorithm>
 
 namespace touchstone::service {
+namespace {
+
+// Only whole addresses: 127.evil.example is a name like any other.
+bool IsLoopback(const std::string& host) {
+  in_addr four{};
+  if (::inet_pton(AF_INET, host.c_str(), &four) == 1) return ntohl(four.s_addr) >> 24 == 127;
+  in6_addr six{};
+  if (::inet_pton(AF_INET6, host.c_str(), &six) != 1) return absl::EqualsIgnoreCase(host, "localhost");
+  return IN6_IS_ADDR_LOOPBACK(&six) || (IN6_IS_ADDR_V4MAPPED(&six) && six.s6_addr[12] == 127);
+}
+
+}  // namespace
 
 std::optional<HostPort> ParseHostPort(absl::string_view address) {
   const size_t colon = address.rfind(':');
@@ -20,6 +36,19 @@ std::optional<HostPort> ParseHostPort(absl::string_view address) {
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   parsed.host = std::string(host);
   return parsed;
+}
+
+bool IsLocalAddress(absl::string_view address) {
+  if (address.empty() || absl::StartsWith(address, "unix:") || absl::StartsWith(address, "unix-abstract:"))
+    return true;
+  // "dns://server/name:port" asks that server what the name means, and stays a foreign one.
+  for (const char* scheme : {"dns:///", "dns:", "ipv4:", "ipv6:"})
+    if (absl::ConsumePrefix(&address, scheme)) break;
+  for (const absl::string_view each : absl::StrSplit(address, ',')) {
+    const std::optional<HostPort> parsed = ParseHostPort(each);
+    if (!parsed || !IsLoopback(parsed->host)) return false;
+  }
+  return true;
 }
 
 }  // namespace touchstone::service

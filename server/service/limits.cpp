@@ -60,7 +60,8 @@ const LimitRow kTable[] = {
     {"stream_memory_mib", "MiB", "memory of a dataset stream; less while many run",
      &Limits::stream_memory_mib, 1, 4096},
     {"max_memory_mib", "MiB",
-     "memory of the process beyond what it has after its start; 0: half of the machine's or container's",
+     "memory of the process beyond what it has after its start; 0: half of what its cgroups or the machine "
+     "allow",
      &Limits::max_memory_mib, 0, 1 << 30},
     {"max_connections", "",
      "files and connections open at once; 0: 0.8 of what the system allows (ulimit -n)",

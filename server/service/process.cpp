@@ -1,5 +1,7 @@
 #include "server/service/process.h"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
 #include <signal.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -76,6 +78,14 @@ void SetUpLog(const std::string& level, bool json) {
   }
   spdlog::set_default_logger(logger);
   spdlog::set_level(spdlog::level::from_str(level));
+}
+
+void ForgetProxies() {
+  for (const char* kind : {"http", "https", "ftp", "all", "grpc"}) {
+    const std::string name = absl::StrCat(kind, "_proxy");
+    ::unsetenv(name.c_str());
+    ::unsetenv(absl::AsciiStrToUpper(name).c_str());
+  }
 }
 
 void AnnounceListening(const std::string& listen, int port) {

@@ -14,6 +14,10 @@ namespace touchstone::service {
 // Lines, or JSON objects, of at least this level ("info").
 void SetUpLog(const std::string& level, bool json);
 
+// A server connects to itself and to the parts of its rig, and to neither through a proxy: takes the variables that name one
+// out of the environment, for libraries that look there (FFmpeg, of a camera's stream). Before there are threads.
+void ForgetProxies();
+
 // Prints "listening on HOST:PORT", the line that scripts wait for.
 void AnnounceListening(const std::string& listen, int port);
 
@@ -34,6 +38,7 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
               const char* what_a_signal_begins, Start start) {
   if (!flags.ok()) return ReportStartError(program, absl::InvalidArgumentError(flags.status().message()));
   if (flags->done) return 0;
+  ForgetProxies();
   SetUpLog(flags->log_level, flags->log_json);
   TakeStopSignals(InheritedIgnore::kOverride);
   RaiseFileLimit();

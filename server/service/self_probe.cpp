@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "server/service/channel.h"
 
 namespace touchstone::service {
 namespace {
@@ -77,12 +78,11 @@ bool SelfProbe::Answers() {
   ::close(file);
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a new connection
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);          // to this process, whatever the environment says
   // gRPC gives up connecting after this time, 20 s by itself, with the same error as if it had been refused.
   constexpr double kMaxMs = 2e9;
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS,
                    static_cast<int>(std::min(2e3 * answer_s_ + 1e3, kMaxMs)));
-  const auto channel = grpc::CreateCustomChannel(address_, CredentialsFor(tls_), arguments);
+  const auto channel = OpenChannel(address_, CredentialsFor(tls_), arguments, {}, ProxyUse::kNever);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +
                        std::chrono::microseconds(static_cast<int64_t>(1e6 * answer_s_)));

@@ -33,6 +33,26 @@ dataset::StreamShare ShareOf(const std::string& client, const Resources* resourc
   return share;
 }
 
+// What a batch takes while it is sent: itself, its copy on the way, and about as much of the work on the next one.
+uint64_t BytesToSend(uint64_t bytes_of_batch) {
+  return 3 * bytes_of_batch;
+}
+
+uint64_t BytesOf(const dataset::DatasetBatch& batch) {
+  uint64_t bytes = 0;
+  for (const std::string& column : batch.data) bytes += column.size();
+  return bytes;
+}
+
+// The same before it is made, as far as it was asked for: a size that the source chooses itself is a small one, and pictures
+// that are packed have no size yet.
+uint64_t BytesAskedFor(const source::SampleHeader& header, const dataset::DatasetPart& part) {
+  uint64_t bytes = 0;
+  for (const dataset::ColumnInfo& column : header.columns) bytes += column.BytesPerSample();
+  const uint64_t samples = part.indices.empty() ? header.samples : part.indices.size();
+  return bytes * std::min<uint64_t>(part.batch_size, samples);
+}
+
 // Whether a stream can end within the time of draining; one that cannot is handed over at once, with a status on which
 // clients go on at another server or at this one when it is back.
 class Handover {
@@ -154,6 +174,9 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
   TOUCHSTONE_ASSIGN_OR_RETURN(source::SampleRequest request, FromProto(message, *resources_));
   request.share = ShareOf(client, resources_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<source::SampleStream> stream, source_->Stream(request));
+  // Of the largest batch so far. Where there is no room for one it is refused before it is made.
+  uint64_t reserved = BytesToSend(BytesAskedFor(stream->header(), request.part));
+  TOUCHSTONE_ASSIGN_OR_RETURN(MemoryBudget::Reservation memory, resources_->memory->Reserve(reserved));
   StallWatch::Call call(resources_->stalls.get(), context);
   v1::StreamDatasetResponse response;
   const auto write = [&] { return writer->Write(response); };
@@ -165,6 +188,10 @@ absl::Status SourceService::DoStream(grpc::ServerContext* context, const v1::Str
     if (resources_->draining) TOUCHSTONE_RETURN_IF_ERROR(handover.Check(resources_->options.drain_s));
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<dataset::DatasetBatch> batch, stream->Next(guard));
     if (!batch.has_value()) return absl::OkStatus();
+    if (const uint64_t bytes = BytesToSend(BytesOf(*batch)); bytes > reserved) {
+      TOUCHSTONE_RETURN_IF_ERROR(memory.Grow(bytes - reserved));
+      reserved = bytes;
+    }
     const uint32_t rows = batch->rows;
     handover.Sent(batch->start_index, rows);
     *response.mutable_batch() = ToProto(*std::move(batch), stream->header().columns);

@@ -19,9 +19,13 @@ MESH = f"lat20={ROOT / 'meshes/lat20.off'}"
 def rig(tmp_path_factory):
     hidden = (f"radial_distortion.k1={HIDDEN_K1}", "background_level.grey=0", "image_noise.sigma_grey=1")
     flags = [word for effect in hidden for word in ("--hide", effect)]
-    with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "3", "--camera-width", str(SIZE[0]), "--camera-height",
-                      str(SIZE[1]), "--jpeg-quality", "100", *flags) as address:
-        yield address
+    with pytest.MonkeyPatch.context() as environment:
+        # A proxy that is not there: neither clients nor the gateway, nor FFmpeg, which reads the camera's stream there, may
+        # ask it.
+        environment.setenv("http_proxy", "http://127.0.0.1:1")
+        with emulated_rig(tmp_path_factory.mktemp("rig"), SPEEDUP, "--seed", "3", "--camera-width", str(SIZE[0]),
+                          "--camera-height", str(SIZE[1]), "--jpeg-quality", "100", *flags) as address:
+            yield address
 
 
 @pytest.fixture(scope="module")

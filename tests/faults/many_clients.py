@@ -19,7 +19,7 @@ async def _read(target: str, refusals: list[str]) -> str:
     request.spec.objects.append("lat00")
     request.spec.plan.sphere.SetInParent()
     request.spec.samples, request.spec.seed = SAMPLES, 1
-    async with grpc.aio.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1)]) as channel:
+    async with grpc.aio.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0)]) as channel:
         call = channel.unary_stream("/touchstone.v1.Source/StreamDataset", request_serializer=source_pb2.StreamDatasetRequest.SerializeToString,
                                     response_deserializer=source_pb2.StreamDatasetResponse.FromString)
         while True:

@@ -130,7 +130,7 @@ class Server(Program):
 
 def own_channel(target: str, *options: tuple[str, int]) -> grpc.Channel:
     """A connection of its own, however many this process has to that server."""
-    return grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), *options])
+    return grpc.insecure_channel(target, options=[("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0), *options])
 
 
 def wait_until(done: Callable[[], bool]) -> bool:

@@ -5,12 +5,14 @@ import pytest
 
 import clock_jumps
 import disk_full
+import failover
 import flat_memory
 import hostile_bytes
 import kill_gateway
 import kill_while_writing
 import lost_device
 import many_clients
+import own_cgroup
 import programs
 import replicas
 import silent_and_slow
@@ -41,6 +43,15 @@ def test_a_full_disk_loses_nothing_that_was_acknowledged():
         pytest.skip(str(error))
 
 
+@pytest.mark.parametrize("limit_mib, streams", [(300, 10), pytest.param(600, 40, marks=pytest.mark.second_tier(
+    "repeated: a larger group and more streams"))])
+def test_a_server_lives_within_the_memory_limit_of_its_own_cgroup(limit_mib, streams):
+    try:
+        passes(own_cgroup.run(limit_mib, streams))
+    except PermissionError as error:
+        pytest.skip(str(error))
+
+
 HOSTILE_PARTS = 4
 
 
@@ -48,6 +59,16 @@ HOSTILE_PARTS = 4
 @pytest.mark.parametrize("source", hostile_bytes.SOURCES, ids=["server", "gateway"])
 def test_every_method_answers_hostile_bytes(source, part):
     passes(hostile_bytes.run(calls=8, sources=(source,), part=(part, HOSTILE_PARTS)))
+
+
+def test_the_second_server_takes_over_where_the_first_is_killed():
+    passes(failover.run(blows=2, signals=("SIGKILL",), samples=20_000))
+
+
+@pytest.mark.second_tier("repeated: more blows, and such that only silence tells, 8 s each")
+@pytest.mark.parametrize("client", ["command line", "python"])
+def test_the_second_server_takes_over_whatever_happens_to_the_first(client):
+    passes(failover.run(blows=30, clients=(client,)))
 
 
 def test_many_clients_get_the_same_bytes():

@@ -11,7 +11,7 @@ import threading
 import pytest
 
 import touchstone
-from touchstone import connection, credentials
+from touchstone import connection, credentials, retry
 from touchstone.dataset import Dataset
 
 _REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
@@ -132,7 +132,7 @@ class Clock:
 def retry_clock(monkeypatch):
     """The clock of connections of this process that try a lost source again."""
     clock = Clock()
-    monkeypatch.setattr(connection, "time", clock)
+    monkeypatch.setattr(retry, "time", clock)
     return clock
 
 
@@ -154,7 +154,7 @@ def start_again(retry_clock):
 @pytest.fixture
 def at_once(monkeypatch):
     """What is refused is refused at the first attempt, however slow the machine is to find out why."""
-    monkeypatch.setattr(connection.Retry, "lost", lambda *_: pytest.fail("tried again although nothing could change"))
+    monkeypatch.setattr(retry.Retry, "lost", lambda *_: pytest.fail("tried again although nothing could change"))
     monkeypatch.setattr(credentials, "_PROBE_S", 60.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import touchstone
 from touchstone import errors
-from touchstone.connection import Retry
+from touchstone.retry import Retry
 
 OPTIONS: dict[str, Any] = dict(objects=["lat00", "lat20"], plan=touchstone.sphere(step_angle_deg=5), samples=200_000, seed=5,
                columns=("index", "descriptor"))

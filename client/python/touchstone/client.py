@@ -12,7 +12,7 @@ import numpy as np
 
 from . import checks, units
 from .batch import Batch
-from .connection import Connection, Retry, Targets
+from .connection import Connection, Targets
 from .credentials import Credentials
 from .dataset import Dataset
 from .diagnosis import Diagnosis
@@ -22,6 +22,7 @@ from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .own_server import OwnServer
 from .plans import PlanLike, Touches
+from .retry import RETRY_FOR_S, Retry
 from .rig import Rig
 from .samples import Samples
 from .session import Session, check_name
@@ -33,7 +34,7 @@ _SOURCE = source_pb2_grpc.SourceStub
 _MODELS = models_pb2_grpc.ModelsStub
 
 
-def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = 60.0,
+def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = RETRY_FOR_S,
             ca: str | None = None, cert: str | None = None, key: str | None = None, token: str | None = None,
             token_file: str | None = None) -> Client:
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
@@ -41,7 +42,7 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
     Args:
       targets: "host:port", several of them, or none: then a touchstone-server is started for this process, which ends
         with client.close() or with the process.
-      timeout_s: how long to wait for the first answer; SourceUnreachable after that.
+      timeout_s: how long to wait for the first answer, of each target; SourceUnreachable after that.
       retry_for_s: how long a lost source is tried again, and the other targets with it, before
         SourceUnreachable is raised; counted from the last thing that arrived.
       ca: speak TLS: PEM file of the CA of the source's certificate, or "system". Default: TOUCHSTONE_TLS_CA.
@@ -69,7 +70,7 @@ class Client(Diagnosis):
       own_server: that connect() started for it, or None; close() ends it.
     """
 
-    def __init__(self, targets: Targets, *, retry_for_s: float = 60.0, credentials: Credentials | None = None):
+    def __init__(self, targets: Targets, *, retry_for_s: float = RETRY_FOR_S, credentials: Credentials | None = None):
         super().__init__(Connection(targets, checks.number("retry_for_s", retry_for_s), credentials=credentials))
         self.own_server: OwnServer | None = None
         self._description: Description | None = None

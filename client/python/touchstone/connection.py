@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import random
 import time
@@ -11,14 +10,11 @@ from typing import Any, Union
 
 import grpc
 
-from . import errors
+from . import errors, retry
 from .credentials import Credentials
+from .retry import Retry
 
 Targets = Union[str, Sequence[str]]
-
-_log = logging.getLogger("touchstone")
-# A source that restarts or hands over is back before anyone needs to hear of it.
-_SILENT_FOR_S = 2.0
 
 _MIB = 1024 * 1024
 _OPTIONS = (
@@ -28,10 +24,13 @@ _OPTIONS = (
     ("grpc.use_local_subchannel_pool", 1),
     # Retrying is done here, where it is known which index comes next.
     ("grpc.enable_retries", 0),
-    # A machine that vanished without a word is noticed within six minutes; servers take pings that come more often
-    # than every five minutes for an attack, unless configured otherwise.
-    ("grpc.keepalive_time_ms", 310_000),
-    ("grpc.keepalive_timeout_ms", 20_000),
+    # By its name this is the least time between two attempts; it is also how long an attempt may take, 20 s by itself.
+    ("grpc.min_reconnect_backoff_ms", int(1000 * retry.CONNECT_S)),
+    # A source that was stopped, or whose machine died, sends nothing: it is asked for a sign of life during every call, also
+    # where it computes for long and sends no data. gRPC's own threads answer and ask, however slowly batches are taken.
+    ("grpc.keepalive_time_ms", int(1000 * retry.KEEPALIVE_S)),
+    ("grpc.keepalive_timeout_ms", int(1000 * retry.KEEPALIVE_TIMEOUT_S)),
+    ("grpc.http2.max_pings_without_data", 0),
 )
 
 
@@ -70,47 +69,10 @@ def parse_targets(targets: Targets) -> tuple[str, ...]:
     return result
 
 
-class Retry:
-    """Decides after each loss whether to try again, and waits: the next target at once, a whole round with back-off."""
-
-    def __init__(self, targets: int, retry_for_s: float):
-        self._targets = targets
-        self._retry_for_s = retry_for_s
-        self._told = False
-        self._since: float | None = None  # the first loss since something arrived
-        self.succeeded()
-
-    def succeeded(self) -> None:
-        """Something arrived: the time allowed for retries starts again."""
-        if self._told and self._since is not None:
-            _log.warning("A source answers again after %.0f s.", time.monotonic() - self._since)
-        self._told = False
-        self._losses = 0
-        self._since = None
-
-    def lost(self, error: errors.TouchstoneError) -> None:
-        """Returns when to try again, or raises `error` when the patience is over."""
-        now = time.monotonic()
-        self._since = now if self._since is None else self._since
-        self._losses += 1
-        if self._losses % self._targets:
-            return
-        rounds = self._losses // self._targets
-        # Jitter keeps a thousand workers from coming back in the same instant.
-        pause_s = min(5.0, 0.05 * 2 ** min(rounds, 10)) * random.uniform(0.5, 1.0)
-        left_s = self._since + self._retry_for_s - now
-        if left_s <= 0:
-            raise error from None
-        if not self._told and now - self._since >= _SILENT_FOR_S:
-            self._told = True
-            _log.warning("%s. Trying again for %.0f s more.", error, left_s)
-        time.sleep(min(pause_s, left_s))
-
-
 class Connection:
     """Not thread-safe to reconnect; give every thread its own."""
 
-    def __init__(self, targets: Targets, retry_for_s: float = 60.0, begin_with: int = 0,
+    def __init__(self, targets: Targets, retry_for_s: float = retry.RETRY_FOR_S, begin_with: int = 0,
                  credentials: Credentials | None = None):
         """`begin_with`: which target comes first, modulo their number, so that many clients spread over them.
 
@@ -166,11 +128,11 @@ class Connection:
 
         Args:
           stub: generated stub class, e.g. source_pb2_grpc.SourceStub.
-          timeout_s: deadline of each attempt.
+          timeout_s: deadline of each attempt; the next target is tried after it.
           retry_for_s: how long to retry; by default the connection's.
         """
-        retry = Retry(len(self.targets), self.retry_for_s if retry_for_s is None else retry_for_s)
-        explained = False
+        patience = Retry(len(self.targets), self.retry_for_s if retry_for_s is None else retry_for_s)
+        explained, silent = False, 0
         while True:
             try:
                 return getattr(stub(self.channel()), method)(request, timeout=timeout_s)
@@ -179,7 +141,10 @@ class Connection:
                     time.sleep(random.uniform(0.01, 0.05))
                     continue
                 failure = errors.from_rpc(error, self.target)
-                if not (repeat and errors.is_lost(error)):
+                # A target that says nothing in time is left for the next one; each gets its time once.
+                late = error.code() == grpc.StatusCode.DEADLINE_EXCEEDED
+                silent += late
+                if not (repeat and (errors.is_lost(error) or (late and silent < len(self.targets)))):
                     raise failure from None
                 if not explained and len(self.targets) == 1 and isinstance(failure, errors.SourceUnreachable):
                     explained = True
@@ -187,4 +152,4 @@ class Connection:
                     if why:
                         raise errors.Refused(why, failure.code, self.target) from None
             self.move_on()
-            retry.lost(failure)
+            patience.lost(failure)

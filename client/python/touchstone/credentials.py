@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import ipaddress
 import os
 import pathlib
 import socket
@@ -13,6 +12,7 @@ from typing import Any, Callable
 import grpc
 
 from . import errors
+from .channel import is_local, open_channel, proxy_for
 
 _PROBE_S = 2.0
 _HOSTNAME_MISMATCH = (62, 64)  # OpenSSL's numbers, of a name and of an address
@@ -60,26 +60,24 @@ class Credentials:
         return token
 
     def channel(self, target: str, options: Any) -> grpc.Channel:
-        if self.ca:
-            channel = grpc.secure_channel(target, grpc.ssl_channel_credentials(
-                None if self.ca == "system" else _read("ca", self.ca),
-                _read("key", self.key) if self.key else None, _read("cert", self.cert) if self.cert else None,
-            ), options=options)
-        else:
-            channel = grpc.insecure_channel(target, options=options)
-        if not self.read_token():
-            return channel
-        if not self.ca and not _is_local(target):
+        if self.read_token() and not self.ca and not is_local(target):
             raise errors.InvalidRequest(
                 f"The token would go to {target} in plain text, where others can read it: give the CA of the source's "
                 'certificate, ca=FILE (or ca="system"), or leave the token out.'
             )
+        channel = open_channel(target, options, grpc.ssl_channel_credentials(
+            None if self.ca == "system" else _read("ca", self.ca),
+            _read("key", self.key) if self.key else None, _read("cert", self.cert) if self.cert else None,
+        ) if self.ca else None)
+        if not self.token and not self.token_file:
+            return channel
         return grpc.intercept_channel(channel, _ShowToken(self))
 
     def explain(self, target: str) -> str:
         """In words what is wrong between a source and these, where TCP works but no connection came about; "" if nothing is."""
         host, _, port = target.rpartition(":")
-        if not host or not port.isdigit() or "/" in host:
+        # The handshake would go to the source itself, which only a proxy may reach.
+        if not host or not port.isdigit() or "/" in host or proxy_for(target):
             return ""
         host = host.strip("[]")
         try:
@@ -136,17 +134,6 @@ def _read(what: str, path: str) -> bytes:
         return pathlib.Path(path).read_bytes()
     except OSError as error:
         raise errors.InvalidRequest(f"{what}: {path}: {error.strerror}.") from None
-
-
-def _is_local(target: str) -> bool:
-    """As touchstone-server decides which addresses are this machine's alone."""
-    if target.startswith("unix:"):
-        return True
-    host = target.rpartition(":")[0].strip("[]")
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def _probing_context(credentials: Credentials) -> ssl.SSLContext:

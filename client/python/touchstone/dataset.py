@@ -13,7 +13,8 @@ import grpc
 
 from . import checks, errors, images, units
 from .batch import Batch
-from .connection import Connection, Retry
+from .connection import Connection
+from .retry import Retry
 from .specification import resolve_batch_size
 from .v1 import source_pb2, source_pb2_grpc
 

@@ -10,10 +10,11 @@ from typing import Any, Callable
 import grpc
 
 from . import checks, errors
-from .connection import Connection, Retry
+from .connection import Connection
 from .evidence import MeshesLike, evidence
 from .models import ModelLike
 from .report import Report
+from .retry import Retry
 from .v1 import diagnosis_pb2, diagnosis_pb2_grpc
 
 # stage ("fitting tip_radius"), and how much of the whole is done, 0 to 1.

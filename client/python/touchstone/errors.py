@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import grpc
 
+from .channel import proxy_for
+
 
 class TouchstoneError(Exception):
     """Base of all.
@@ -78,7 +80,9 @@ def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
     details = error.details() or (_NOT_OFFERED if code == "UNIMPLEMENTED" else "no message")
     kind = _CLASSES.get(code, SourceFailed)
     if kind is SourceUnreachable:
-        details = f"{target}: {_IN_WORDS[code]} (gRPC: {details})"
+        proxy = proxy_for(target)
+        through = f". It was asked through {proxy}; hosts in no_proxy are asked without it" if proxy else ""
+        details = f"{target}: {_IN_WORDS[code]}{through} (gRPC: {details})"
     elif kind is SourceFailed and is_lost(error):
         details = f"{target}: {_BROKEN} (gRPC: {details})"
     return kind(details, code, target)

@@ -43,6 +43,7 @@ from .images import ImageLike
 from .loader import TouchstoneLoader
 from .models import ModelLike
 from .plans import PlanLike
+from .retry import RETRY_FOR_S
 from .shared_lease import LeaseSlot, SharedLease
 from .specification import resolve_batch_size, specification
 from .torch_samples import KeyedShuffle, TouchstoneSamples
@@ -84,7 +85,7 @@ class TouchstoneDataset(IterableDataset):
                  image: ImageLike | None = None, max_draws: int = 0, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
                  ranks: int | None = None, whole_rounds: bool = False, new_samples_each_epoch: bool = False,
-                 retry_for_s: float = 60.0):
+                 retry_for_s: float = RETRY_FOR_S):
         """Arguments as in Client.dataset(), and:
 
         Args:

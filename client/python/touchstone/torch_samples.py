@@ -16,6 +16,7 @@ from .images import ImageLike
 from .models import ModelLike
 from .permutation import Permutation
 from .plans import PlanLike
+from .retry import RETRY_FOR_S
 from .samples import Samples
 from .specification import specification
 from .torch_support import ranks_of_this_job, rows, tensors
@@ -38,7 +39,7 @@ class TouchstoneSamples(Dataset):
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                 image: ImageLike | None = None, max_draws: int = 0, retry_for_s: float = 60.0):
+                 image: ImageLike | None = None, max_draws: int = 0, retry_for_s: float = RETRY_FOR_S):
         """Arguments as in Client.samples(), and:
 
         Args:
