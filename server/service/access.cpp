@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/access_credentials.h"
+#include "server/service/certificate_stamp.h"
 #include "server/service/metrics.h"
 
 namespace touchstone::service {
@@ -146,6 +147,9 @@ Caller Access::CallerOf(const grpc::ServerContext& context) {
   const auto [begin, end] = context.client_metadata().equal_range("authorization");
   for (auto entry = begin; entry != end; ++entry)
     shown.authorization.emplace_back(entry->second.data(), entry->second.size());
+  if (const auto stamp = context.client_metadata().find(StampName());
+      stamp != context.client_metadata().end())
+    shown.certificate_names = NamesOfStamp({stamp->second.data(), stamp->second.size()});
   for (const char* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME})
     for (const grpc::string_ref& name : context.auth_context()->FindPropertyValues(property))
       shown.certificate_names.emplace_back(name.data(), name.size());
@@ -159,19 +163,7 @@ absl::Status Access::Require(const grpc::ServerContext& context, Role needed, co
 
 void Access::LogRefusal(absl::string_view method, const absl::Status& why) {
   if (calls_ != nullptr) calls_->Refused(method, static_cast<int>(why.code()));
-  const auto now = clock_.Now();
-  uint64_t unlogged = 0;
-  {
-    const std::lock_guard<std::mutex> lock(refusal_mutex_);
-    if (now - refusal_logged_ < std::chrono::seconds(1)) {
-      ++refusals_unlogged_;
-      return;
-    }
-    refusal_logged_ = now;
-    std::swap(unlogged, refusals_unlogged_);
-  }
-  spdlog::warn("refused {}: {}{}", MethodName(method), std::string(why.message()),
-               unlogged == 0 ? "" : absl::StrCat("; ", unlogged, " more before"));
+  refusals_.Say(absl::StrCat("refused ", MethodName(method), ": ", why.message()));
 }
 
 std::string WithCaller(const std::string& said, const Caller& caller) {

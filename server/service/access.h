@@ -18,6 +18,7 @@
 #include "server/service/access_roles.h"
 #include "server/service/file_stamp.h"
 #include "server/service/server_certificates.h"
+#include "server/service/sparse_warning.h"
 
 namespace touchstone::service {
 
@@ -78,9 +79,7 @@ class Access {
   std::shared_ptr<const AccessFile> file_;
 
   CallMetrics* calls_ = nullptr;
-  std::mutex refusal_mutex_;
-  Clock::Time refusal_logged_{};
-  uint64_t refusals_unlogged_ = 0;
+  SparseWarning refusals_{clock_};
 
   std::mutex warning_mutex_;
   std::condition_variable warning_ends_;

@@ -1,5 +1,6 @@
 #include "server/service/access_credentials.h"
 
+#include <absl/strings/match.h>
 #include <grpc/grpc.h>
 #include <grpc/grpc_security.h>
 #include <grpc/grpc_security_constants.h>
@@ -8,6 +9,7 @@
 #include "server/base/check.h"
 #include "server/base/printable.h"
 #include "server/service/access.h"
+#include "server/service/certificate_stamp.h"
 
 namespace touchstone::service {
 namespace {
@@ -33,6 +35,7 @@ void ProcessCall(void* access_of_port, grpc_auth_context* context, const grpc_me
   for (size_t i = 0; i < count; ++i) {
     const absl::string_view key = ViewOf(metadata[i].key);
     if (key == ":path") method = std::string(ViewOf(metadata[i].value));
+    if (key == StampName()) shown.certificate_names = NamesOfStamp(ViewOf(metadata[i].value));
     if (key == "authorization") shown.authorization.emplace_back(ViewOf(metadata[i].value));
   }
   for (const char* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME})
@@ -64,7 +67,9 @@ void AccessCredentials::SetAuthMetadataProcessor(const std::shared_ptr<grpc::Aut
 
 int AccessCredentials::AddPortToServer(const std::string& address, grpc_server* server) {
   grpc_server_credentials* credentials = nullptr;
-  if (ServerCertificates* const certificates = access_->certificates(); certificates == nullptr) {
+  // TLS of connections that are handed over has ended before (connection_acceptor.h).
+  const bool plain = absl::StartsWith(address, "external:");
+  if (ServerCertificates* const certificates = access_->certificates(); plain || certificates == nullptr) {
     credentials = grpc_insecure_server_credentials_create();
   } else {
     // Not required in the handshake: health checks come without, and who has a token needs none.

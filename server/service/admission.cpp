@@ -13,6 +13,7 @@
 #include "server/base/memory_limit.h"
 #include "server/base/over_limit.h"
 #include "server/service/limits.h"
+#include "server/service/relayed_peer.h"
 
 namespace touchstone::service {
 namespace {
@@ -28,7 +29,8 @@ constexpr size_t kManyClients = 10'000;  // then those who have everything saved
 
 }  // namespace
 
-std::string ClientOfPeer(const std::string& peer) {
+std::string ClientOfPeer(const std::string& transport_peer) {
+  const std::string peer = PeerOfTransport(transport_peer);
   if (!absl::StartsWith(peer, "ipv")) return peer.substr(0, peer.find(':'));
   return peer.substr(0, peer.rfind(':'));
 }
@@ -64,13 +66,7 @@ void Places::Leave(const std::string& client) {
   if (--found->second == 0) by_client_.erase(found);
 }
 
-CallRate::CallRate(int max_per_s, const Clock& clock)
-    : max_per_s_(max_per_s), max_saved_(kSavedS * max_per_s), clock_(clock) {}
-
-double CallRate::Grown(const Saved& saved, Clock::Time now) const {
-  return std::min(max_saved_,
-                  saved.calls + max_per_s_ * std::chrono::duration<double>(now - saved.at).count());
-}
+CallRate::CallRate(int max_per_s, const Clock& clock) : max_per_s_(max_per_s), clock_(clock) {}
 
 absl::Status CallRate::Take(const std::string& client) {
   if (max_per_s_ == 0) return absl::OkStatus();
@@ -78,14 +74,11 @@ absl::Status CallRate::Take(const std::string& client) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (by_client_.size() >= kManyClients)
     for (auto each = by_client_.begin(); each != by_client_.end();)
-      each = Grown(each->second, now) >= max_saved_ ? by_client_.erase(each) : std::next(each);
-  Saved& saved = by_client_.emplace(client, Saved{max_saved_, now}).first->second;
-  saved = {Grown(saved, now), now};
-  if (saved.calls < 1)
-    return Busy(absl::StrCat(client, " has made its calls of this second"), "max_unary_calls_per_s",
-                max_per_s_);
-  saved.calls -= 1;
-  return absl::OkStatus();
+      each = each->second.full(now) ? by_client_.erase(each) : std::next(each);
+  if (by_client_.emplace(client, TokenBucket(max_per_s_, kSavedS, now)).first->second.Take(now))
+    return absl::OkStatus();
+  return Busy(absl::StrCat(client, " has made its calls of this second"), "max_unary_calls_per_s",
+              max_per_s_);
 }
 
 MemoryBudget::MemoryBudget(int max_mib)
@@ -152,7 +145,7 @@ void StallWatch::Run() {
     const auto now = clock_.Now();
     for (Call* call : calls_) {
       if (!call->waiting_ || std::chrono::duration<double>(now - call->since_).count() <= stall_s_) continue;
-      spdlog::warn("{}: nothing moved for {} s (stall_s): the call is cancelled", call->context_->peer(),
+      spdlog::warn("{}: nothing moved for {} s (stall_s): the call is cancelled", PeerOf(*call->context_),
                    stall_s_);
       call->context_->TryCancel();
       call->since_ = now;

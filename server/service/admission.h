@@ -12,9 +12,11 @@
 #include <thread>
 
 #include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
 #include <grpcpp/server_context.h>
 
 #include "server/base/clock.h"
+#include "server/service/token_bucket.h"
 
 namespace touchstone::service {
 
@@ -68,16 +70,10 @@ class CallRate {
   absl::Status Take(const std::string& client);
 
  private:
-  struct Saved {
-    double calls;
-    Clock::Time at;
-  };
-  double Grown(const Saved& saved, Clock::Time now) const;
-
-  const double max_per_s_, max_saved_;
+  const double max_per_s_;
   const Clock& clock_;
   std::mutex mutex_;
-  std::map<std::string, Saved> by_client_;
+  std::map<std::string, TokenBucket> by_client_;
 };
 
 // What the process may use beyond what it has when it begins to serve. Thread-safe.

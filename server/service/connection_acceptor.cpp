@@ -1,15 +1,14 @@
 #include "server/service/connection_acceptor.h"
 
 #include <absl/strings/str_cat.h>
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,14 +16,20 @@
 #include <chrono>
 #include <cstring>
 #include <iterator>
+#include <utility>
 
 #include "server/base/status.h"
+#include "server/service/certificate_stamp.h"
 #include "server/service/host_port.h"
 
 namespace touchstone::service {
 namespace {
 
 constexpr double kShareOfFiles = 0.8;
+// The client's socket, and a pair of the relay and gRPC.
+constexpr size_t kFilesOfConnection = 3;
+constexpr size_t kSpareFiles = 24;  // beyond the share, for stops
+constexpr int kRelayThreads = 2;
 constexpr size_t kManyAddresses = 1000;  // then those without a connection are forgotten
 
 uint64_t FileLimit() {
@@ -32,25 +37,31 @@ uint64_t FileLimit() {
   return ::getrlimit(RLIMIT_NOFILE, &limit) == 0 ? limit.rlim_cur : 1024;
 }
 
-// Of the socket behind a file; 0: the file is closed.
-uint64_t InodeOf(int file) {
-  struct stat info;
-  return ::fstat(file, &info) == 0 && S_ISSOCK(info.st_mode) ? info.st_ino : 0;
+// As gRPC writes it: "ipv4:10.0.0.7", "ipv6:[::1]"; an IPv4 address that came through an IPv6 listener is one of IPv4.
+std::string AddressOf(const sockaddr_storage& peer) {
+  char text[INET6_ADDRSTRLEN] = "";
+  if (peer.ss_family == AF_INET) {
+    ::inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(&peer)->sin_addr, text, sizeof text);
+    return absl::StrCat("ipv4:", text);
+  }
+  const in6_addr& address = reinterpret_cast<const sockaddr_in6*>(&peer)->sin6_addr;
+  if (IN6_IS_ADDR_V4MAPPED(&address)) {
+    ::inet_ntop(AF_INET, &address.s6_addr[12], text, sizeof text);
+    return absl::StrCat("ipv4:", text);
+  }
+  ::inet_ntop(AF_INET6, &address, text, sizeof text);
+  return absl::StrCat("ipv6:[", text, "]");
 }
 
-std::string HostOf(const sockaddr_storage& peer, socklen_t size) {
-  char host[NI_MAXHOST] = "";
-  ::getnameinfo(reinterpret_cast<const sockaddr*>(&peer), size, host, sizeof host, nullptr, 0,
-                NI_NUMERICHOST);
-  return host;
+int PortOf(const sockaddr_storage& address) {
+  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6*>(&address)->sin6_port
+                                             : reinterpret_cast<const sockaddr_in*>(&address)->sin_port);
 }
 
 int PortOf(int file) {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
-  if (::getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) != 0) return 0;
-  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6*>(&address)->sin6_port
-                                             : reinterpret_cast<sockaddr_in*>(&address)->sin_port);
+  return ::getsockname(file, reinterpret_cast<sockaddr*>(&address), &size) == 0 ? PortOf(address) : 0;
 }
 
 void SetPort(sockaddr* address, int port) {
@@ -86,15 +97,22 @@ uint64_t RaiseFileLimit() {
   return FileLimit();
 }
 
-ConnectionAcceptor::ConnectionAcceptor(const Limits& limits)
-    : max_file_(limits.max_connections > 0
-                    ? limits.max_connections
-                    : static_cast<int>(std::min(kShareOfFiles * FileLimit(), static_cast<double>(1 << 30)))),
-      max_per_address_(limits.max_connections_per_address) {}
+ConnectionAcceptor::ConnectionAcceptor(const Limits& limits, ServerCertificates* certificates)
+    : limits_(limits),
+      max_files_(limits.max_connections > 0 ? limits.max_connections
+                                            : static_cast<size_t>(std::min(kShareOfFiles * FileLimit(),
+                                                                           static_cast<double>(1 << 30)))),
+      tls_(certificates == nullptr ? nullptr : std::make_unique<TlsPort>(certificates)) {}
 
-absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> ConnectionAcceptor::Listen(const std::string& address,
-                                                                               const Limits& limits) {
-  std::unique_ptr<ConnectionAcceptor> acceptor(new ConnectionAcceptor(limits));
+std::unique_ptr<Wire> ConnectionAcceptor::WireOf(int file) {
+  if (tls_ == nullptr) return PlainWire(file);
+  std::unique_ptr<Wire> wire = tls_->Accept(file);
+  return wire == nullptr ? nullptr : Stamped(std::move(wire));
+}
+
+absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> ConnectionAcceptor::Listen(
+    const std::string& address, const Limits& limits, ServerCertificates* certificates) {
+  std::unique_ptr<ConnectionAcceptor> acceptor(new ConnectionAcceptor(limits, certificates));
   TOUCHSTONE_RETURN_IF_ERROR(acceptor->Open(address));
   return acceptor;
 }
@@ -146,6 +164,12 @@ ConnectionAcceptor::~ConnectionAcceptor() {
 void ConnectionAcceptor::Begin(
     std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_acceptor) {
   grpc_acceptor_ = std::move(grpc_acceptor);
+  relay_ = std::make_unique<ConnectionRelay>(limits_, kRelayThreads, [this](int file) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+    parameters.listener_fd = -1;
+    parameters.fd = file;
+    grpc_acceptor_->HandleNewConnection(&parameters);
+  });
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -184,46 +208,75 @@ void ConnectionAcceptor::Take(int listener) {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
       return;
     }
-    if (!HasRoom(file, HostOf(peer, size))) {
+    const std::string address = AddressOf(peer);
+    const Room room = RoomFor(file, address);
+    std::unique_ptr<Wire> wire = room == Room::kNone ? nullptr : WireOf(file);
+    if (wire == nullptr) {
       ::close(file);
       continue;
     }
     const int yes = 1;
     ::setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
-    parameters.listener_fd = listener;
-    parameters.fd = file;
-    grpc_acceptor_->HandleNewConnection(&parameters);
+    Address& own = by_address_[address];
+    own.connections.push_back(relay_->Add(
+        {file, std::move(wire), absl::StrCat(address, ":", PortOf(peer)), own.calls, room == Room::kStop}));
   }
 }
 
-void ConnectionAcceptor::ForgetClosed(std::vector<Connection>* connections) {
+void ConnectionAcceptor::ForgetClosed(Connections* connections) {
   connections->erase(std::remove_if(connections->begin(), connections->end(),
-                                    [](const Connection& each) { return InodeOf(each.file) != each.inode; }),
+                                    [](const auto& each) { return each->closed(); }),
                      connections->end());
 }
 
-bool ConnectionAcceptor::HasRoom(int file, const std::string& address) {
-  // The system gives the lowest number that is free, so that all below it are in use.
-  if (file >= max_file_) {
-    spdlog::warn("{}: a connection is closed: {} files are open already (max_connections)", address,
-                 max_file_);
-    return false;
-  }
+RelayedConnection* ConnectionAcceptor::LongestIdle(const Connections& connections, bool only_stop) {
+  RelayedConnection* found = nullptr;
+  // Those that have said nothing go first.
+  const auto order = [](const RelayedConnection& each) {
+    return std::make_pair(each.spoke(), each.idle_since_s());
+  };
+  for (const auto& each : connections)
+    if (each->only_stop() == only_stop && each->idle() && !each->close_asked() && !each->closed() &&
+        (found == nullptr || order(*each) < order(*found)))
+      found = each.get();
+  return found;
+}
+
+// A full house has room for who comes if somebody in it has no call; else for a stop.
+ConnectionAcceptor::Room ConnectionAcceptor::RoomFor(int file, const std::string& address) {
   if (by_address_.size() >= kManyAddresses)
     for (auto each = by_address_.begin(); each != by_address_.end();) {
-      ForgetClosed(&each->second);
-      each = each->second.empty() ? by_address_.erase(each) : std::next(each);
+      ForgetClosed(&each->second.connections);
+      each = each->second.connections.empty() ? by_address_.erase(each) : std::next(each);
     }
-  std::vector<Connection>& own = by_address_[address];
-  if (own.size() >= max_per_address_) ForgetClosed(&own);
-  if (own.size() >= max_per_address_) {
-    spdlog::warn("{}: a connection is closed: it has {} already (max_connections_per_address)", address,
-                 own.size());
-    return false;
+  Connections& own = by_address_[address].connections;
+  ForgetClosed(&own);
+  const size_t stops =
+      std::count_if(own.begin(), own.end(), [](const auto& each) { return each->only_stop(); });
+  // The system gives the lowest number that is free, so that all below it are in use.
+  const size_t files = std::max<size_t>(file, (relay_->size() + 1) * kFilesOfConnection);
+  const bool own_full = own.size() - stops >= static_cast<size_t>(limits_.max_connections_per_address);
+  if (!own_full && files < max_files_) return Room::kAny;
+  RelayedConnection* idle = LongestIdle(own, false);
+  if (!own_full)
+    for (const auto& [other, each] : by_address_)
+      if (idle == nullptr) idle = LongestIdle(each.connections, false);
+  if (idle != nullptr) {
+    idle->AskToClose();
+    return Room::kAny;
   }
-  own.push_back({file, InodeOf(file)});
-  return true;
+  full_.Say(absl::StrCat(
+      address,
+      own_full
+          ? absl::StrCat(" has ", own.size(), " connections with calls already (max_connections_per_address)")
+          : absl::StrCat(": ", files, " files are in use already (max_connections)"),
+      ": one more is for Control.Stop alone"));
+  if (files >= max_files_ + kSpareFiles) return Room::kNone;
+  if (stops < kOnlyStopPerAddress) return Room::kStop;
+  RelayedConnection* const silent = LongestIdle(own, true);
+  if (silent == nullptr) return Room::kNone;
+  silent->AskToClose();
+  return Room::kStop;
 }
 
 }  // namespace touchstone::service

@@ -6,6 +6,7 @@
 #include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/service/convert.h"
+#include "server/service/relayed_peer.h"
 
 namespace touchstone::service {
 grpc::Status ControlService::AcquireLease(grpc::ServerContext* context,
@@ -38,7 +39,7 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
       "stop from {} at {}: {}; {} requests under way end",
       WithCaller(request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes),
                  resources_->access->CallerOf(*context)),
-      context->peer(),
+      PeerOf(*context),
       request->reason().empty() ? "no reason given" : Printable(request->reason(), kMaxReasonBytes), running);
   response->set_aborted_touches(running);
   response->set_standstill(true);
@@ -80,6 +81,19 @@ grpc::Status ControlService::GetState(grpc::ServerContext*, const v1::GetStateRe
   response->set_uptime_s(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - resources_->started).count());
   return grpc::Status::OK;
+}
+
+std::vector<CallQueue::Method> ControlService::StopMethods() {
+  return {RawMethod(this, &ControlService::RequestStop, &resources_->options, &ControlService::Stop)};
+}
+
+std::vector<CallQueue::Method> ControlService::OtherMethods() {
+  const Limits* const limits = &resources_->options;
+  return {RawMethod(this, &ControlService::RequestAcquireLease, limits, &ControlService::AcquireLease),
+          RawMethod(this, &ControlService::RequestRenewLease, limits, &ControlService::RenewLease),
+          RawMethod(this, &ControlService::RequestReleaseLease, limits, &ControlService::ReleaseLease),
+          RawMethod(this, &ControlService::RequestReset, limits, &ControlService::Reset),
+          RawMethod(this, &ControlService::RequestGetState, limits, &ControlService::GetState)};
 }
 
 }  // namespace touchstone::service

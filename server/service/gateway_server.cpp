@@ -111,9 +111,7 @@ struct GatewayServer::Parts {
   std::unique_ptr<RigService> rig_service;
   std::unique_ptr<FreedriveService> freedrive;
   std::unique_ptr<JournalSessionsService> sessions;
-  std::unique_ptr<ConnectionAcceptor> acceptor;
-  std::unique_ptr<grpc::Server> server;
-  int port = 0;
+  Serving serving;
   std::unique_ptr<StatusPages> pages;  // asks the server
 };
 
@@ -175,31 +173,26 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   services.push_back({"touchstone.v1.Control", parts.control.get()});
   for (const ServedService& service : services)
     GuardRequests(service.service, &resources.options, resources.memory.get(), resources.rate.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      Serving serving, StartServing(options.common, services, resources.access.get(), resources.calls.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options.common, services, parts.control.get(),
+                                                            resources.access.get(), resources.calls.get()));
   resources.memory->Begin();
-  parts.acceptor = std::move(serving.acceptor);
-  parts.server = std::move(serving.server);
-  parts.port = serving.port;
+  parts.serving = std::move(serving);
   if (!options.common.metrics.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(parts.pages, StatusPages::Start(options.common.metrics, &resources,
-                                                                parts.server->InProcessChannel({})));
+                                                                parts.serving.server->InProcessChannel({})));
   }
   return gateway;
 }
 
 GatewayServer::~GatewayServer() {
   parts_->pages.reset();
-  if (parts_->server == nullptr) return;
   if (parts_->rig != nullptr) parts_->rig->Close();
   parts_->resources.draining = true;
-  if (parts_->acceptor != nullptr) parts_->acceptor->End();
-  parts_->server->Shutdown(std::chrono::system_clock::now());
-  parts_->server->Wait();
+  parts_->serving.End();
 }
 
 int GatewayServer::port() const {
-  return parts_->port;
+  return parts_->serving.port;
 }
 
 source::RigDevice& GatewayServer::device() {
@@ -211,8 +204,8 @@ void GatewayServer::Drain() {
   if (parts_->rig != nullptr) parts_->rig->Close();
   parts_->resources.draining = true;
   if (parts_->pages != nullptr) parts_->pages->StopAsking();
-  if (parts_->acceptor != nullptr) parts_->acceptor->End();
-  StopServing(parts_->resources.options, parts_->server.get());
+  if (parts_->serving.acceptor != nullptr) parts_->serving.acceptor->End();
+  StopServing(parts_->resources.options, parts_->serving.server.get());
 }
 
 }  // namespace touchstone::service

@@ -62,6 +62,12 @@ struct Limits {
   double keepalive_timeout_s = 20;
   int max_unary_calls_per_s = 200;
   double max_unary_s = 60;
+  int max_calls_per_address = 256;
+  int max_resets_per_s = 1000;
+  int max_pings_per_s = 100;
+  int max_frames_per_s = 200'000;
+  int max_header_kib = 64;
+  double flood_s = 10;
   double self_probe_s = 60;
   double drain_s = 8;
 

@@ -1,4 +1,5 @@
 // Requests and clients that ask for too much: each is refused with the limit's name and value, and nobody else notices.
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <grpc/grpc.h>
@@ -197,7 +198,11 @@ TEST_F(OverloadTest, ACallWithoutAMessageIsRefused) {
     queue.Next(&tag, &ok);
     call->Finish(&status, nullptr);
     queue.Next(&tag, &ok);
-    EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT) << method << ": " << status.error_message();
+    // gRPC itself refuses those of a queue of their own (call_queue.h).
+    const bool queued = absl::StrContains(method, "Control");
+    EXPECT_EQ(status.error_code(), queued ? grpc::INTERNAL : grpc::INVALID_ARGUMENT)
+        << method << ": " << status.error_message();
+    EXPECT_NE(status.error_message(), "") << method;
   }
 }
 

@@ -160,30 +160,9 @@ class GuardedHandler : public MethodHandler {
     return nullptr;
   }
 
-  // Bytes that the request will take, about.
   absl::StatusOr<uint64_t> Measure(grpc_byte_buffer* buffer) const {
-    const size_t bytes = grpc_byte_buffer_length(buffer);
-    const size_t max_mib = large_ ? limits_.max_upload_mib : limits_.max_request_mib;
-    if (bytes > max_mib * kMebibyte)
-      return OverLimit(absl::StrCat(request_.name(), " has bytes:"), bytes,
-                       large_ ? "max_upload_mib" : "max_request_mib", max_mib * kMebibyte);
-    WireCount count;
     BufferStream stream(buffer);
-    google::protobuf::io::CodedInputStream input(&stream);
-    input.SetTotalBytesLimit(INT32_MAX);
-    CountWire(&input, &request_, &count);  // what is not a message is refused when it is decoded
-    const auto check = [&](const char* what, uint64_t has, const char* name, int max) {
-      return has <= static_cast<uint64_t>(max)
-                 ? absl::OkStatus()
-                 : OverLimit(absl::StrCat(request_.name(), " has ", what, ":"), has, name, max);
-    };
-    TOUCHSTONE_RETURN_IF_ERROR(check("touches", count.Messages("touchstone.v1.CommandedTouch"),
-                                     "max_touches_per_request", limits_.max_touches_per_request));
-    TOUCHSTONE_RETURN_IF_ERROR(
-        check("messages and texts", count.elements, "max_request_elements", limits_.max_request_elements));
-    TOUCHSTONE_RETURN_IF_ERROR(
-        check("numbers", count.numbers, "max_request_numbers", limits_.max_request_numbers));
-    return bytes + count.elements * kBytesOfElement + count.numbers * kBytesOfNumber;
+    return MeasureRequest(request_, grpc_byte_buffer_length(buffer), &stream, limits_, large_);
   }
 
   const std::unique_ptr<MethodHandler> handler_;
@@ -198,6 +177,31 @@ class GuardedHandler : public MethodHandler {
 
 }  // namespace
 
+absl::StatusOr<uint64_t> MeasureRequest(const google::protobuf::Descriptor& request, size_t bytes,
+                                        google::protobuf::io::ZeroCopyInputStream* stream,
+                                        const Limits& limits, bool large) {
+  const size_t max_mib = large ? limits.max_upload_mib : limits.max_request_mib;
+  if (bytes > max_mib * kMebibyte)
+    return OverLimit(absl::StrCat(request.name(), " has bytes:"), bytes,
+                     large ? "max_upload_mib" : "max_request_mib", max_mib * kMebibyte);
+  WireCount count;
+  google::protobuf::io::CodedInputStream input(stream);
+  input.SetTotalBytesLimit(INT32_MAX);
+  CountWire(&input, &request, &count);  // what is not a message is refused when it is decoded
+  const auto check = [&](const char* what, uint64_t has, const char* name, int max) {
+    return has <= static_cast<uint64_t>(max)
+               ? absl::OkStatus()
+               : OverLimit(absl::StrCat(request.name(), " has ", what, ":"), has, name, max);
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(check("touches", count.Messages("touchstone.v1.CommandedTouch"),
+                                   "max_touches_per_request", limits.max_touches_per_request));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      check("messages and texts", count.elements, "max_request_elements", limits.max_request_elements));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      check("numbers", count.numbers, "max_request_numbers", limits.max_request_numbers));
+  return bytes + count.elements * kBytesOfElement + count.numbers * kBytesOfNumber;
+}
+
 void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* memory, CallRate* rate) {
   for (const std::unique_ptr<RpcServiceMethod>& method : service->*MemberOf(MethodsOfService())) {
     if (method->method_type() != grpc::internal::RpcMethod::NORMAL_RPC &&
@@ -208,6 +212,7 @@ void GuardRequests(grpc::Service* service, const Limits* limits, MemoryBudget* m
     const auto* descriptor = google::protobuf::DescriptorPool::generated_pool()->FindMethodByName(name);
     if (descriptor == nullptr) continue;
     std::unique_ptr<MethodHandler>& handler = (*method).*MemberOf(HandlerOfMethod());
+    if (handler == nullptr) continue;  // of a call queue, which looks itself (call_queue.h)
     handler = std::make_unique<GuardedHandler>(std::move(handler), *descriptor, limits, memory, rate);
   }
 }

@@ -11,6 +11,7 @@
 #include "server/geometry/pose.h"
 #include "server/service/call_guard.h"
 #include "server/service/convert.h"
+#include "server/service/relayed_peer.h"
 #include "server/session/base_pose.h"
 #include "server/source/request_checks.h"
 
@@ -121,7 +122,7 @@ grpc::Status RigControlService::AcquireLease(grpc::ServerContext* context,
         .Write("lease_acquired", {{"holder", response->holder()},
                                   {"epoch", absl::StrCat(response->epoch())},
                                   {"taken_from", request->take() ? before : ""},
-                                  {"peer", context->peer()}})
+                                  {"peer", PeerOf(*context)}})
         .IgnoreError();
   return status;
 }
@@ -144,8 +145,8 @@ grpc::Status RigControlService::Stop(grpc::ServerContext* context, const v1::Sto
       request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes);
   const Caller caller = resources_->access->CallerOf(*context);
   const std::string who = request->holder().empty() && caller.name.empty()
-                              ? context->peer()
-                              : absl::StrCat(WithCaller(said, caller), " at ", context->peer());
+                              ? PeerOf(*context)
+                              : absl::StrCat(WithCaller(said, caller), " at ", PeerOf(*context));
   const gateway::StopOutcome outcome = rig_->Stop(reason, who);
   response->set_aborted_touches(outcome.motions);
   response->set_standstill(outcome.standstill.ok());
@@ -163,7 +164,7 @@ grpc::Status RigControlService::Reset(grpc::ServerContext* context, const v1::Re
     leases_->Revoke();
     const std::string who = WithCaller(request->holder(), resources_->access->CallerOf(*context));
     status = rig_->Reset(request->reason(), who);
-    spdlog::warn("reset by {} ({}) from {}: {}", who, request->reason(), context->peer(),
+    spdlog::warn("reset by {} ({}) from {}: {}", who, request->reason(), PeerOf(*context),
                  status.ok() ? "released" : std::string(status.message()));
   }
   if (!status.ok()) return ToGrpc(status);

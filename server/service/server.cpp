@@ -48,9 +48,7 @@ struct Server::Parts {
   std::unique_ptr<ModelsService> models;
   std::unique_ptr<SessionsService> sessions;
   std::unique_ptr<DiagnosisService> diagnosis;
-  std::unique_ptr<ConnectionAcceptor> acceptor;
-  std::unique_ptr<grpc::Server> server;
-  int port = 0;
+  Serving serving;
   std::unique_ptr<StatusPages> pages;  // asks the server
 };
 
@@ -92,26 +90,20 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
                                                {"touchstone.v1.Diagnosis", parts.diagnosis.get()}};
   for (const ServedService& service : services)
     GuardRequests(service.service, &resources.options, resources.memory.get(), resources.rate.get());
-  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving,
-                              StartServing(options, services, resources.access.get(), resources.calls.get()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(Serving serving, StartServing(options, services, parts.control.get(),
+                                                            resources.access.get(), resources.calls.get()));
   resources.memory->Begin();
-  parts.acceptor = std::move(serving.acceptor);
-  parts.server = std::move(serving.server);
-  parts.port = serving.port;
+  parts.serving = std::move(serving);
   if (!options.metrics.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        parts.pages, StatusPages::Start(options.metrics, &resources, parts.server->InProcessChannel({})));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts.pages, StatusPages::Start(options.metrics, &resources,
+                                                                parts.serving.server->InProcessChannel({})));
   }
   return server;
 }
 
 Server::~Server() {
   parts_->pages.reset();
-  if (parts_->acceptor != nullptr) parts_->acceptor->End();
-  if (parts_->server != nullptr) {
-    parts_->server->Shutdown(std::chrono::system_clock::now());
-    parts_->server->Wait();
-  }
+  parts_->serving.End();
 }
 
 int Server::metrics_port() const {
@@ -119,20 +111,20 @@ int Server::metrics_port() const {
 }
 
 int Server::port() const {
-  return parts_->port;
+  return parts_->serving.port;
 }
 
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(parts_->resources.options.max_message_mib << 20);
-  return parts_->server->InProcessChannel(arguments);
+  return parts_->serving.server->InProcessChannel(arguments);
 }
 
 void Server::Drain() {
   parts_->resources.draining = true;
   if (parts_->pages != nullptr) parts_->pages->StopAsking();
-  if (parts_->acceptor != nullptr) parts_->acceptor->End();
-  StopServing(parts_->resources.options, parts_->server.get());
+  if (parts_->serving.acceptor != nullptr) parts_->serving.acceptor->End();
+  StopServing(parts_->resources.options, parts_->serving.server.get());
 }
 
 }  // namespace touchstone::service

@@ -10,26 +10,12 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/service/openssl_objects.h"
 
 namespace touchstone::service {
 namespace {
 
 constexpr uint64_t kMaxPemBytes = 4 << 20;
-
-template <auto Free>
-struct Freed {
-  template <typename T>
-  void operator()(T* object) const {
-    Free(object);
-  }
-};
-using Bio = std::unique_ptr<BIO, Freed<BIO_free>>;
-using Certificate = std::unique_ptr<X509, Freed<X509_free>>;
-using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
-
-Bio BioOf(const std::string& text) {
-  return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
-}
 
 absl::StatusOr<Certificate> FirstCertificate(const std::string& text, const std::string& path) {
   Certificate certificate(PEM_read_bio_X509(BioOf(text).get(), nullptr, nullptr, nullptr));

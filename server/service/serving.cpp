@@ -17,6 +17,9 @@
 namespace touchstone::service {
 namespace {
 
+// A stop of a rig ends when the arm stands; others may stop it meanwhile.
+constexpr int kStopThreads = 4, kControlThreads = 2;
+
 // Health checking and reflection are process-wide switches of gRPC.
 void EnablePlugins() {
   static const bool enabled = [] {
@@ -63,8 +66,17 @@ absl::Status CheckServing(const ServerOptions& options) {
   return absl::OkStatus();
 }
 
+void Serving::End() {
+  if (acceptor != nullptr) acceptor->End();
+  if (server != nullptr) {
+    server->Shutdown(std::chrono::system_clock::now());
+    server->Wait();
+  }
+  queues.clear();
+}
+
 absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
-                                     Access* access, CallMetrics* calls) {
+                                     ControlService* control, Access* access, CallMetrics* calls) {
   for (const ServedService& service : services) TOUCHSTONE_RETURN_IF_ERROR(CheckRolesOf(service.name));
   EnablePlugins();
   Serving serving;
@@ -75,7 +87,8 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::ve
   if (at_path) {
     builder.AddListeningPort(options.listen, access->Credentials(), &serving.port);
   } else if (!options.listen.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(serving.acceptor, ConnectionAcceptor::Listen(options.listen, options));
+    TOUCHSTONE_ASSIGN_OR_RETURN(serving.acceptor,
+                                ConnectionAcceptor::Listen(options.listen, options, access->certificates()));
     serving.port = serving.acceptor->port();
     connections = builder.experimental().AddExternalConnectionAcceptor(
         grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, access->Credentials());
@@ -86,10 +99,13 @@ absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::ve
     builder.experimental().SetInterceptorCreators(std::move(interceptors));
   }
   for (const ServedService& service : services) builder.RegisterService(service.service);
+  serving.queues.push_back(std::make_unique<CallQueue>(&builder, kStopThreads, control->StopMethods()));
+  serving.queues.push_back(std::make_unique<CallQueue>(&builder, kControlThreads, control->OtherMethods()));
   serving.server = builder.BuildAndStart();
   if (serving.server == nullptr || (at_path && serving.port == 0))
     return absl::UnavailableError(
         absl::StrCat("listen = '", options.listen, "': a server could not be started there"));
+  for (const auto& queue : serving.queues) queue->Begin();
   if (connections != nullptr) serving.acceptor->Begin(std::move(connections));
   if (auto* health = serving.server->GetHealthCheckService(); health != nullptr)
     for (const ServedService& service : services) health->SetServingStatus(service.name, true);

@@ -9,7 +9,9 @@
 #include <grpcpp/grpcpp.h>
 
 #include "server/service/access.h"
+#include "server/service/call_queue.h"
 #include "server/service/connection_acceptor.h"
+#include "server/service/control_service.h"
 #include "server/service/metrics.h"
 #include "server/service/server_options.h"
 
@@ -23,15 +25,20 @@ struct ServedService {
 struct Serving {
   std::unique_ptr<ConnectionAcceptor> acceptor;  // ends before the server; null: no port
   std::unique_ptr<grpc::Server> server;
+  std::vector<std::unique_ptr<CallQueue>> queues;  // of Control
   int port = 0;
+
+  // Ends whatever runs.
+  void End();
 };
 
 // Errors name the option.
 absl::Status CheckServing(const ServerOptions& options);
 // INTERNAL if a method has no role (access_roles.h). `access` decides on every call, `calls` counts them
 // if it is there; both outlive the server.
+// `control` is one of the services; its calls wait for no others.
 absl::StatusOr<Serving> StartServing(const ServerOptions& options, const std::vector<ServedService>& services,
-                                     Access* access, CallMetrics* calls);
+                                     ControlService* control, Access* access, CallMetrics* calls);
 // NOT_SERVING, no more calls, up to drain_s for running ones.
 void StopServing(const ServerOptions& options, grpc::Server* server);
 

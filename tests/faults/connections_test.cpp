@@ -1,4 +1,4 @@
-// Connections that say nothing, and more of them than a server has files for.
+// Connections that say nothing, and more of them than a server has files for, or an address may have.
 #include <absl/strings/str_cat.h>
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -13,11 +13,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <grpcpp/grpcpp.h>
 
+#include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"
 
 namespace touchstone {
@@ -75,12 +77,10 @@ class SilentConnections {
       ASSERT_EQ(::connect(file, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     }
   }
-  // How many the server greeted; it closed the others.
-  int Greeted() const {
-    int greeted = 0;
+  // Waits until the server closes it.
+  bool IsClosed(int number) const {
     char byte;
-    for (const int file : files_) greeted += ::recv(file, &byte, 1, 0) == 1 ? 1 : 0;
-    return greeted;
+    return ::recv(files_[number], &byte, 1, 0) <= 0;
   }
 
  private:
@@ -88,18 +88,50 @@ class SilentConnections {
   std::vector<int> files_;
 };
 
-grpc::Status Describe(int port) {
+std::shared_ptr<grpc::Channel> NewChannel(int port) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 200);
-  const auto stub = v1::Source::NewStub(grpc::CreateCustomChannel(
-      absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials(), arguments));
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return grpc::CreateCustomChannel(absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials(),
+                                   arguments);
+}
+
+grpc::Status Describe(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
   context.set_wait_for_ready(true);
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
   v1::DescribeResponse description;
-  return stub->Describe(&context, {}, &description);
+  return v1::Source::NewStub(channel)->Describe(&context, {}, &description);
 }
+
+grpc::Status Describe(int port) {
+  return Describe(NewChannel(port));
+}
+
+// A dataset that is being read, until it goes.
+class RunningStream {
+ public:
+  explicit RunningStream(const std::shared_ptr<grpc::Channel>& channel)
+      : stub_(v1::Source::NewStub(channel)) {
+    v1::StreamDatasetRequest request;
+    request.mutable_spec()->add_objects("lat20");
+    request.mutable_spec()->mutable_plan()->mutable_sphere();
+    request.mutable_spec()->set_samples(1'000'000'000);
+    reader_ = stub_->StreamDataset(&context_, request);
+    v1::StreamDatasetResponse response;
+    EXPECT_TRUE(reader_->Read(&response));
+  }
+  ~RunningStream() {
+    context_.TryCancel();
+    (void)reader_->Finish();
+  }
+
+ private:
+  const std::unique_ptr<v1::Source::Stub> stub_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>> reader_;
+};
 
 TEST(Connections, ThatSayNothingDoNotMakeAServerDeaf) {
   const ServerProcess server(128, "--handshake-s 0.3 --max-connections-per-address 100000");
@@ -112,12 +144,44 @@ TEST(Connections, ThatSayNothingDoNotMakeAServerDeaf) {
   EXPECT_TRUE(Describe(server.port()).ok()) << "again";
 }
 
-TEST(Connections, OfOneAddressAreLimited) {
-  const ServerProcess server(1024, "--max-connections-per-address 3");
+TEST(Connections, ThatSayNothingGiveWayToNewerOnesOfTheirAddress) {
+  const ServerProcess server(1024, "--max-connections-per-address 3 --handshake-s 600");
   ASSERT_NE(server.port(), 0);
   SilentConnections silent(server.port());
   silent.Open(10);
-  EXPECT_EQ(silent.Greeted(), 3);
+  for (int k = 0; k < 7; ++k) EXPECT_TRUE(silent.IsClosed(k)) << k;
+  EXPECT_TRUE(Describe(server.port()).ok());
+}
+
+TEST(Connections, ThatAreIdleDoNotShutTheirAddressOut) {
+  const ServerProcess server(1024, "--max-connections-per-address 3");
+  ASSERT_NE(server.port(), 0);
+  std::vector<std::shared_ptr<grpc::Channel>> idle;
+  for (int k = 0; k < 10; ++k) {
+    idle.push_back(NewChannel(server.port()));
+    EXPECT_TRUE(Describe(idle.back()).ok()) << k;
+  }
+  // Those that were closed come back when they have a call.
+  for (const auto& channel : idle) EXPECT_TRUE(Describe(channel).ok());
+}
+
+TEST(Connections, WithCallsLeaveRoomForAStop) {
+  const ServerProcess server(1024, "--max-connections-per-address 2");
+  ASSERT_NE(server.port(), 0);
+  std::vector<std::unique_ptr<RunningStream>> streams;
+  for (int k = 0; k < 2; ++k) streams.push_back(std::make_unique<RunningStream>(NewChannel(server.port())));
+  const auto call = [&](auto method, auto request, auto response) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(60));
+    const auto stub = v1::Control::NewStub(NewChannel(server.port()));
+    return (stub.get()->*method)(&context, request, &response);
+  };
+  const grpc::Status state = call(&v1::Control::Stub::GetState, v1::GetStateRequest(), v1::State());
+  EXPECT_EQ(state.error_code(), grpc::UNAVAILABLE);
+  for (int k = 0; k < 20; ++k) {
+    const grpc::Status stop = call(&v1::Control::Stub::Stop, v1::StopRequest(), v1::StopResponse());
+    EXPECT_TRUE(stop.ok()) << stop.error_message();
+  }
 }
 
 }  // namespace

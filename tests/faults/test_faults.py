@@ -7,6 +7,7 @@ import clock_jumps
 import disk_full
 import failover
 import flat_memory
+import floods
 import hostile_bytes
 import kill_gateway
 import kill_while_writing
@@ -83,6 +84,16 @@ def test_memory_is_flat_over_a_long_stream():
     "long: limits of a server as they are by default"))])
 def test_silent_and_slow_clients_do_not_shut_others_out(handshake_s):
     passes(silent_and_slow.run(handshake_s=handshake_s))
+
+
+QUICK_FLOODS = ("rapid resets of streams", "heads without an end", "pings whose answers nobody reads", "reflection without a message")
+
+
+@pytest.mark.parametrize("seconds, names", [(1.5, QUICK_FLOODS), pytest.param(60, (), marks=pytest.mark.second_tier(
+    "long: every flood for a minute"))], ids=["some", "all"])
+@pytest.mark.parametrize("source", floods.SOURCES)
+def test_a_flood_keeps_nobody_from_asking_and_stopping(seconds, names, source):
+    passes(floods.run(seconds=seconds, names=names, sources=(source,), slack=10 if names else 1))
 
 
 @pytest.mark.parametrize("part", clock_jumps.PARTS)
