@@ -5,10 +5,12 @@ import pytest
 
 import clock_jumps
 import disk_full
+import failing_files
 import flat_memory
 import hostile_bytes
 import kill_gateway
 import kill_while_writing
+import little_memory
 import lost_device
 import many_clients
 import programs
@@ -39,6 +41,19 @@ def test_a_full_disk_loses_nothing_that_was_acknowledged():
         passes(disk_full.run())
     except PermissionError as error:
         pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("name", ["export .h5", "import .csv", pytest.param("", marks=pytest.mark.second_tier(
+    "repeated: every other command that writes"), id="all")])
+def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
+    # For one command, those of the faults that differ in what the program can still do; the tests in C++ have all of them.
+    faults = [fault for fault in failing_files.FAULTS if not name or fault.name in ("full from then on", "killed")]
+    passes(failing_files.run((name,) if name else (), faults))
+
+
+@pytest.mark.second_tier("repeated: the same commands with less memory each time")
+def test_a_program_without_memory_says_so_and_leaves_whole_files_or_none():
+    passes(little_memory.run())
 
 
 HOSTILE_PARTS = 4
