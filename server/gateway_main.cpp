@@ -1,6 +1,7 @@
 // touchstone-gateway: the physical source as a process. Options come from flags and a TOML file; flags win.
 #include <malloc.h>
 
+#include "server/base/out_of_memory.h"
 #include "server/service/gateway_server.h"
 #include "server/service/process.h"
 
@@ -8,9 +9,11 @@ int main(int argc, char** argv) {
   using namespace touchstone;
   // Not one for each of the server's threads, in each of which a touch sooner or later leaves its pages.
   mallopt(M_ARENA_MAX, 2);
-  return service::RunServer(
-      "touchstone-gateway", service::ParseGatewayFlags(argc, argv),
-      [](const service::GatewayFlags& flags) { return flags.options.common; },
-      "what moves is stopped; draining",
-      [](const service::GatewayFlags& flags) { return service::GatewayServer::Start(flags.options); });
+  return RunWithinMemory("touchstone-gateway", service::kExitOutOfMemory, [&] {
+    return service::RunServer(
+        "touchstone-gateway", service::ParseGatewayFlags(argc, argv),
+        [](const service::GatewayFlags& flags) { return flags.options.common; },
+        "what moves is stopped; draining",
+        [](const service::GatewayFlags& flags) { return service::GatewayServer::Start(flags.options); });
+  });
 }

@@ -18,6 +18,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/provenance.h"
 #include "client/source/lease_keeper.h"
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
@@ -53,9 +54,14 @@ std::string CheckWholeNumber(std::string& text) {
   return "";
 }
 
+// What a server, a file or a person wrote, as it may stand on a terminal.
+std::string Shown(absl::string_view text) {
+  return Printable(text, std::string::npos, /*keep_lines=*/true);
+}
+
 int PrintError(absl::string_view message) {
   std::fflush(stdout);
-  std::fprintf(stderr, "touchstone: error: %s\n", std::string(message).c_str());
+  std::fprintf(stderr, "touchstone: error: %s\n", Shown(message).c_str());
   return kBadInput;
 }
 
@@ -177,7 +183,8 @@ absl::Status Cli::Write(const std::string& path, absl::string_view data) const {
 }
 
 absl::Status Cli::Print(absl::string_view text) const {
-  std::fwrite(text.data(), 1, text.size(), stdout_taken_ ? stderr : stdout);
+  const std::string shown = Shown(text);
+  std::fwrite(shown.data(), 1, shown.size(), stdout_taken_ ? stderr : stdout);
   return absl::OkStatus();
 }
 
@@ -197,11 +204,11 @@ void Cli::AddOutputOptions(CLI::App* command) {
 }
 
 void Cli::Log(absl::string_view line) const {
-  if (!output_.quiet) std::fprintf(stderr, "%s\n", std::string(line).c_str());
+  if (!output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
 }
 
 void Cli::Detail(absl::string_view line) const {
-  if (output_.verbose && !output_.quiet) std::fprintf(stderr, "%s\n", std::string(line).c_str());
+  if (output_.verbose && !output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
 }
 
 std::string Cli::HelpCommand() const {

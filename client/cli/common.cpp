@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -166,7 +167,7 @@ std::string Counted(uint64_t count, const std::string& one, const std::string& m
 }
 
 void PrintJson(const Json& json) {
-  std::printf("%s\n", json.dump(2).c_str());
+  std::printf("%s\n", EscapeInJson(json.dump(2, ' ', false, Json::error_handler_t::replace)).c_str());
 }
 
 }  // namespace touchstone::cli

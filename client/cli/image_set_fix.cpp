@@ -141,15 +141,13 @@ absl::Status FixImageSetFolder(const Cli& cli, const std::string& folder, const 
   if (!after.ok())
     return absl::InvalidArgumentError(
         absl::StrCat("fixed like this it is no image set: ", after.status().message()));
-  TOUCHSTONE_RETURN_IF_ERROR(session::WriteImageSetFiles(files, output));
+  std::map<std::string, std::string> others;
   if (session::HasTouches(folder)) {
-    std::error_code error;
-    fs::copy_file(fs::path(folder) / session::kTouchesCsv, fs::path(output) / session::kTouchesCsv, error);
-    if (error)
-      return absl::InternalError(
-          absl::StrCat(output, ": touches.csv could not be copied: ", error.message()));
-    cli.Log("note: touches.csv is copied as it is");
+    TOUCHSTONE_ASSIGN_OR_RETURN(others[session::kTouchesCsv],
+                                ReadFile((fs::path(folder) / session::kTouchesCsv).string()));
   }
+  TOUCHSTONE_RETURN_IF_ERROR(session::WriteImageSetFiles(files, output, others));
+  if (!others.empty()) cli.Log("note: touches.csv is copied as it is");
   const size_t dropped = set.size() - after->size();
   cli.LogWritten(output, absl::StrCat(" (", folder, " with ", session::FixOptions(fix), "; ",
                                       Counted(after->size(), "picture", "pictures"),

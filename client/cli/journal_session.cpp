@@ -111,15 +111,17 @@ absl::Status ExportFromJournal(const Cli& cli, const std::string& path, const st
 
 absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,
                                          const std::string& session) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const auto journal, session::Journal::Open(journal_path, session::Journal::Mode::kCreateOrReadWrite));
   session::ImportOptions options;
   options.session = session;
   const bool hdf5 = absl::EndsWith(file_path, ".h5") || absl::EndsWith(file_path, ".hdf5");
-  TOUCHSTONE_RETURN_IF_ERROR(hdf5 ? session::ImportSessionHdf5(file_path, options, journal.get())
-                                  : session::ImportSessionCsv(file_path, options, journal.get()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession made, journal->Session(session));
-  return made.touches;
+  // The file first: one that is refused makes no journal.
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::SessionContent content,
+      hdf5 ? session::ReadSessionHdf5(file_path, options) : session::ReadSessionCsv(file_path, options));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const auto journal, session::Journal::Open(journal_path, session::Journal::Mode::kCreateOrReadWrite));
+  TOUCHSTONE_RETURN_IF_ERROR(journal->AddSession(content));
+  return content.touches.size();
 }
 
 }  // namespace touchstone::cli

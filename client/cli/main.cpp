@@ -4,7 +4,9 @@
 #include <cstdlib>
 
 #include "client/cli/common.h"
+#include "client/cli/exit_code.h"
 #include "client/cli/interrupt.h"
+#include "server/base/out_of_memory.h"
 
 namespace touchstone::cli {
 
@@ -47,7 +49,9 @@ int main(int argc, char** argv) {
   // A source in this process keeps no log: stdout and stderr are the command's.
   spdlog::set_level(spdlog::level::off);
   touchstone::cli::Interrupt::Install();
-  touchstone::cli::Cli cli;
-  touchstone::cli::AddCommands(&cli);
-  return cli.Run(argc, argv);
+  return touchstone::RunWithinMemory("touchstone", touchstone::cli::kRefused, [&] {
+    touchstone::cli::Cli cli;
+    touchstone::cli::AddCommands(&cli);
+    return cli.Run(argc, argv);
+  });
 }

@@ -9,6 +9,7 @@
 #include "client/cli/common.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/image/encode.h"
@@ -118,13 +119,19 @@ class NormalizeRun {
     return normalized;
   }
 
+  static absl::StatusOr<std::string> EncodeMask(const image::Image& normalized) {
+    return image::EncodePng(normalized.mask.data(), normalized.width, normalized.height, 1);
+  }
+  // Its name beside the picture's.
+  static std::string MaskOf(const std::string& picture) {
+    const fs::path path(picture);
+    return (path.parent_path() / (path.stem().string() + kMaskSuffix)).string();
+  }
+
   absl::Status WriteMask(const image::Image& normalized, const std::string& result) const {
     if (!options_.masks) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const std::string mask,
-        image::EncodePng(normalized.mask.data(), normalized.width, normalized.height, 1));
-    const fs::path path = fs::path(options_.output) / result;
-    return WriteFileAtomically((path.parent_path() / (path.stem().string() + kMaskSuffix)).string(), mask);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string mask, EncodeMask(normalized));
+    return WriteFileAtomically((fs::path(options_.output) / MaskOf(result)).string(), mask);
   }
 
   absl::Status RunFolder() {
@@ -157,7 +164,7 @@ class NormalizeRun {
     TOUCHSTONE_ASSIGN_OR_RETURN(v1::ImageSetFiles files, session::ReadImageSetFiles(options_.folder));
     TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet set, session::ParseImageSet(files));
     ProgressBar bar(!cli_.output().quiet);
-    std::vector<std::pair<std::string, image::Image>> normalized;
+    std::map<std::string, std::string> masks;
     for (size_t k = 0; k < set.size(); ++k) {
       if (Interrupt::Raised()) return absl::CancelledError("interrupted");
       bar.Show(done_, set.size(), done_);
@@ -169,12 +176,12 @@ class NormalizeRun {
       TOUCHSTONE_ASSIGN_OR_RETURN(image::Image result, NormalizeOne(picture, row.file));
       TOUCHSTONE_ASSIGN_OR_RETURN(*files.mutable_files(static_cast<int>(k))->mutable_png(),
                                   image::EncodePng(result.pixels.data(), result.width, result.height, 1));
-      if (options_.masks) normalized.emplace_back(row.file, std::move(result));
+      if (options_.masks) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(masks[MaskOf(row.file)], EncodeMask(result));
+      }
     }
     bar.Clear();
-    TOUCHSTONE_RETURN_IF_ERROR(session::WriteImageSetFiles(files, options_.output));
-    for (const auto& [file, picture] : normalized) TOUCHSTONE_RETURN_IF_ERROR(WriteMask(picture, file));
-    return absl::OkStatus();
+    return session::WriteImageSetFiles(files, options_.output, masks);
   }
 
   const Cli& cli_;

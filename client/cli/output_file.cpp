@@ -12,9 +12,11 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <random>
 #include <utility>
 
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {
@@ -24,13 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxLinks = 40;
 constexpr size_t kBlockBytes = 1 << 20;
-constexpr size_t kMaxNameBytes = 200;  // of a name in one that is made from it; file systems allow 255
-
-absl::Status FileFailure(const std::string& path, absl::string_view what, int error_number) {
-  const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error_number));
-  if (error_number == ENOSPC || error_number == EDQUOT) return absl::ResourceExhaustedError(message);
-  return absl::InvalidArgumentError(message);
-}
 
 absl::Status Refused(const std::string& path, absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat(path, " ", why));
@@ -53,37 +48,26 @@ absl::StatusOr<Destination> Resolve(const std::string& path) {
     // What is no regular file is opened by the name that it has: /dev/fd/3 leads to no other.
     if (!S_ISREG(destination.info.st_mode)) return destination;
     const std::unique_ptr<char, void (*)(void*)> real(::realpath(path.c_str(), nullptr), std::free);
-    if (real == nullptr) return FileFailure(path, "cannot be followed", errno);
+    if (real == nullptr) return FileError(errno, path, "cannot be followed");
     destination.path = real.get();
     return destination;
   }
-  if (errno != ENOENT) return FileFailure(path, "cannot be written", errno);
+  if (errno != ENOENT) return FileError(errno, path, "cannot be written");
   // A link to what is not there yet.
   for (int links = 0; links < kMaxLinks; ++links) {
     std::error_code error;
     if (!fs::is_symlink(fs::symlink_status(destination.path, error))) return destination;
     const fs::path target = fs::read_symlink(destination.path, error);
-    if (error) return FileFailure(path, "cannot be followed", error.value());
+    if (error) return FileError(error.value(), path, "cannot be followed");
     destination.path =
         target.is_absolute() ? target.string() : (fs::path(destination.path).parent_path() / target).string();
   }
-  return FileFailure(path, "cannot be followed", ELOOP);
+  return FileError(ELOOP, path, "cannot be followed");
 }
 
 std::string FolderOf(const std::string& path) {
   const std::string folder = fs::path(path).parent_path().string();
   return folder.empty() ? "." : folder;
-}
-
-// A name in the folder that nothing has.
-std::string FreePath(const std::string& folder, const std::string& name) {
-  std::random_device random;
-  while (true) {
-    const std::string path = absl::StrCat(folder, "/.", name.substr(0, kMaxNameBytes), ".",
-                                          absl::Hex(random(), absl::kZeroPad8), ".part");
-    struct stat info;
-    if (::lstat(path.c_str(), &info) != 0) return path;
-  }
 }
 
 absl::Status CheckFolder(const std::string& path, std::string folder, bool makes_folders) {
@@ -94,8 +78,8 @@ absl::Status CheckFolder(const std::string& path, std::string folder, bool makes
   if (!fs::is_directory(folder, error))
     return Refused(path, absl::StrCat("cannot be made: ", folder, " is no folder"));
   // Only trying shows it: permissions, a read-only file system, and what root may not do either.
-  const std::string probe = FreePath(folder, "touchstone-probe");
-  const int file = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  const std::string probe = UnfinishedPathOf(folder + "/touchstone-probe");
+  const int file = OpenFile(probe, O_WRONLY | O_CREAT | O_EXCL, 0600);
   if (file < 0) return Refused(path, absl::StrCat("cannot be made in ", folder, ": ", std::strerror(errno)));
   ::close(file);
   ::unlink(probe.c_str());
@@ -155,30 +139,16 @@ class Descriptor {
   Descriptor& operator=(const Descriptor&) = delete;
 
   int number() const { return number_; }
-  bool Close() { return ::close(std::exchange(number_, -1)) == 0; }
 
  private:
   int number_;
 };
 
-absl::Status WriteAll(int descriptor, const std::string& path, absl::string_view data) {
-  while (!data.empty()) {
-    const ssize_t written = ::write(descriptor, data.data(), data.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return FileFailure(path, "writing failed", errno);
-    data.remove_prefix(static_cast<size_t>(written));
-  }
-  return absl::OkStatus();
-}
-
 // A new file with what the umask leaves of these permission bits.
 absl::Status MakeFile(const std::string& path, absl::string_view data, mode_t mode) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
-  if (file.number() < 0) return FileFailure(path, "cannot be made", errno);
-  TOUCHSTONE_RETURN_IF_ERROR(WriteAll(file.number(), path, data));
-  if (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)
-    return FileFailure(path, "cannot be synced", errno);
-  return file.Close() ? absl::OkStatus() : FileFailure(path, "closing failed", errno);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<FileWriter> file, FileWriter::Create(path, mode));
+  TOUCHSTONE_RETURN_IF_ERROR(file->Write(data));
+  return file->Close();
 }
 
 // Renames unless something stands there; EEXIST then.
@@ -192,58 +162,57 @@ int RenameToNew(const char* from, const char* to) {
 }
 
 absl::Status MoveIntoPlace(const std::string& part, const std::string& path, const Destination& destination,
-                           bool force) {
+                           bool force, std::optional<mode_t> bits) {
   if (!force) {
     const int failed = RenameToNew(part.c_str(), destination.path.c_str());
     if (failed == EEXIST)
       return absl::AlreadyExistsError(absl::StrCat(
           path, " exists now, though it did not when the command began; what it should have had is in ",
           part));
-    return failed == 0 ? absl::OkStatus() : FileFailure(path, "cannot be renamed into place", failed);
+    return failed == 0 ? SyncFolderOf(destination.path)
+                       : FileError(failed, path, "cannot be renamed into place");
   }
   if (destination.exists) {
     // The file stays its owner's where we may say so; then its bits, which a change of owner clears.
     if (::chown(part.c_str(), destination.info.st_uid, destination.info.st_gid) != 0) errno = 0;
-    if (::chmod(part.c_str(), destination.info.st_mode & 07777) != 0)
-      return FileFailure(path, "its permission bits cannot be kept", errno);
+    if (::chmod(part.c_str(), bits.value_or(destination.info.st_mode & 07777)) != 0)
+      return FileError(errno, path, "its permission bits cannot be kept");
   }
-  if (::rename(part.c_str(), destination.path.c_str()) != 0)
-    return FileFailure(path, "cannot be renamed into place", errno);
-  return absl::OkStatus();
+  return RenameSynced(part, destination.path);
 }
 
 // A FIFO, a terminal, /dev/null: opened as it is, never made, cut or replaced.
 absl::StatusOr<std::unique_ptr<Descriptor>> OpenSpecial(const std::string& path) {
-  auto file = std::make_unique<Descriptor>(::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC));
+  auto file = std::make_unique<Descriptor>(OpenFile(path, O_WRONLY | O_NOCTTY));
   struct stat info;
   if (file->number() < 0 || ::fstat(file->number(), &info) != 0)
-    return FileFailure(path, "cannot be opened", errno);
+    return FileError(errno, path, "cannot be opened");
   if (S_ISREG(info.st_mode) || S_ISBLK(info.st_mode)) return Refused(path, "has become another file");
   return file;
 }
 
 absl::Status CopyTo(const std::string& from, int descriptor, const std::string& path) {
-  const Descriptor file(::open(from.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.number() < 0) return FileFailure(from, "cannot be read again", errno);
+  const Descriptor file(OpenFile(from, O_RDONLY));
+  if (file.number() < 0) return FileError(errno, from, "cannot be read again");
   std::string block(kBlockBytes, '\0');
   for (ssize_t got = 1; got > 0;) {
     got = ::read(file.number(), block.data(), block.size());
-    if (got < 0) return FileFailure(from, "reading failed", errno);
+    if (got < 0) return FileError(errno, from, "reading failed");
     TOUCHSTONE_RETURN_IF_ERROR(WriteAll(descriptor, path, {block.data(), static_cast<size_t>(got)}));
   }
   return absl::OkStatus();
 }
 
 absl::Status WriteBeside(const std::string& path, const Destination& destination, bool force,
-                         const std::function<absl::Status(const std::string&)>& write) {
-  const std::string part =
-      FreePath(FolderOf(destination.path), fs::path(destination.path).filename().string());
+                         const std::function<absl::Status(const std::string&)>& write,
+                         std::optional<mode_t> bits = std::nullopt) {
+  const std::string part = UnfinishedPathOf(destination.path);
   absl::Status status = write(part);
   if (!status.ok()) {
     ::unlink(part.c_str());
     return absl::Status(status.code(), absl::StrReplaceAll(status.message(), {{part, path}}));
   }
-  status = MoveIntoPlace(part, path, destination, force);
+  status = MoveIntoPlace(part, path, destination, force, bits);
   if (!status.ok() && !absl::IsAlreadyExists(status)) ::unlink(part.c_str());
   return status;
 }
@@ -295,17 +264,21 @@ absl::Status CheckOutputFiles(const std::vector<OutputFile>& outputs, const std:
   return absl::OkStatus();
 }
 
-absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force) {
+absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force,
+                             std::optional<mode_t> bits) {
   if (path.empty() || IsStandardOutput(path)) {
     ::fwrite(data.data(), 1, data.size(), stdout);  // Cli::Run reports what went wrong with it
     return absl::OkStatus();
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const Destination destination, Resolve(path));
   if (destination.regular())
-    return WriteBeside(path, destination, force, [&](const std::string& part) {
-      // What takes the place of another file gets its bits at the end, and shows nobody anything before.
-      return MakeFile(part, data, destination.exists ? 0600 : 0666);
-    });
+    return WriteBeside(
+        path, destination, force,
+        [&](const std::string& part) {
+          // What takes the place of another file gets its bits at the end, and shows nobody anything before.
+          return MakeFile(part, data, destination.exists ? 0600 : bits.value_or(0666));
+        },
+        bits);
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto file, OpenSpecial(path));
   return WriteAll(file->number(), path, data);
 }
@@ -318,7 +291,7 @@ absl::Status WriteOutputFileBy(const std::string& path, bool force,
     TOUCHSTONE_ASSIGN_OR_RETURN(destination, Resolve(path));
     if (destination.regular()) return WriteBeside(path, destination, force, write);
   }
-  const std::string passing = FreePath(fs::temp_directory_path().string(), "touchstone-output");
+  const std::string passing = UnfinishedPathOf((fs::temp_directory_path() / "touchstone-output").string());
   absl::Status status = write(passing);
   if (status.ok() && to_stdout) {
     ::fflush(stdout);

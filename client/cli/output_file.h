@@ -10,7 +10,10 @@
 // Those are only checked here.
 #pragma once
 
+#include <sys/types.h>
+
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,8 +48,10 @@ absl::Status CheckOutputFiles(const std::vector<OutputFile>& outputs, const std:
                               bool force);
 
 // Writes an output. Empty and "-" are standard output. If a file came to stand there since the check, it is not
-// replaced without `force`: ALREADY_EXISTS then names the file beside it that has the data.
-absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force);
+// replaced without `force`: ALREADY_EXISTS then names the file beside it that has the data. `bits`: its permission bits, if not
+// those of the file that it replaces or what the umask leaves.
+absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force,
+                             std::optional<mode_t> bits = std::nullopt);
 
 // The same for data that a library writes to a path of its own (HDF5): `write` is given a path that is free and
 // must make the file there.

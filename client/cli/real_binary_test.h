@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/file_writer.h"
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 

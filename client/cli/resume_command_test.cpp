@@ -16,6 +16,7 @@
 #include "client/cli/real_binary_test.h"
 #include "client/cli/test_server.h"
 #include "client/source/dataset_manifest.h"
+#include "server/base/file_writer.h"
 #include "server/base/test_tier.h"
 #include "server/base/text.h"
 

@@ -10,6 +10,7 @@
 #include "client/cli/output_file.h"
 #include "client/source/errors.h"
 #include "client/source/image_set_files.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/stored_session.h"
@@ -63,9 +64,9 @@ absl::Status WriteSessionFolder(const service::StoredSession& session, const std
   if (client::HasTouches(folder))
     return absl::AlreadyExistsError(absl::StrCat((fs::path(folder) / client::kTouchesCsv).string(),
                                                  " exists already; a new folder was expected"));
-  TOUCHSTONE_RETURN_IF_ERROR(client::WriteImageSetFiles(*session.images, folder));
-  if (session.csv.empty()) return absl::OkStatus();
-  return WriteFileAtomically((fs::path(folder) / client::kTouchesCsv).string(), session.csv);
+  std::map<std::string, std::string> others;
+  if (!session.csv.empty()) others[client::kTouchesCsv] = session.csv;
+  return client::WriteImageSetFiles(*session.images, folder, others);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <filesystem>
 
 #include "client/cli/provenance.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 

@@ -1,14 +1,16 @@
 // touchstone token: makes what a server with --token-file asks for.
+#include <absl/cleanup/cleanup.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 
 #include "client/cli/common.h"
-#include "server/base/new_file.h"
+#include "client/cli/output_file.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/access_file.h"
@@ -20,32 +22,28 @@ struct TokenOptions {
   std::string name, role, add_to, out;
 };
 
-absl::Status CannotWrite(const std::string& path) {
-  if (errno == EEXIST) return absl::InvalidArgumentError(absl::StrCat(path, " exists; --force replaces it"));
-  return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::strerror(errno)));
-}
+constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;
 
-// In one write, so that a server that reads it meanwhile sees whole lines. Only its owner may read or write a new file.
-absl::Status WriteOwnersFile(const std::string& path, const std::string& text, int flags) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, S_IRUSR | S_IWUSR);
-  if (file < 0) return CannotWrite(path);
-  const bool written =
-      ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(file) == 0;
-  const absl::Status status = written ? absl::OkStatus() : CannotWrite(path);
-  ::close(file);
-  TOUCHSTONE_RETURN_IF_ERROR(status);
-  return SyncFolderOf(path);
-}
-
-// A token file stays one: what is wrong with it is said before it grows.
+// A token file stays one: what is wrong with it is said before it grows. A server that reads it meanwhile sees whole lines,
+// since it is replaced as a whole; whoever adds another one at the same time waits.
 absl::Status AddLine(const std::string& path, const std::string& line) {
-  std::string start;
-  if (::access(path.c_str(), F_OK) == 0) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, 1 << 20));
+  if (::access(path.c_str(), F_OK) != 0)
+    return WriteOutputFile(path, line + "\n", /*force=*/false, kOwnerAlone);
+  while (true) {
+    const int file = OpenFile(path, O_RDONLY);
+    if (file < 0) return FileError(errno, path, "cannot be opened");
+    const auto close_at_end = absl::MakeCleanup([file] { ::close(file); });
+    ::flock(file, LOCK_EX);
+    struct stat locked {
+    }, there{};
+    if (::fstat(file, &locked) != 0 || ::stat(path.c_str(), &there) != 0)
+      return FileError(errno, path, "cannot be examined");
+    if (locked.st_ino != there.st_ino || locked.st_dev != there.st_dev) continue;  // replaced while we waited
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::string text, ReadFile(path, 1 << 20));
     TOUCHSTONE_RETURN_IF_ERROR(service::AccessFile::Parse(text, path).status());
-    if (!text.empty() && text.back() != '\n') start = "\n";
+    if (!text.empty() && text.back() != '\n') text += '\n';
+    return WriteOutputFile(path, absl::StrCat(text, line, "\n"), /*force=*/true);
   }
-  return WriteOwnersFile(path, start + line + "\n", O_APPEND);
 }
 
 absl::Status RunNew(const Cli& cli, const TokenOptions& options) {
@@ -57,8 +55,7 @@ absl::Status RunNew(const Cli& cli, const TokenOptions& options) {
   // The token first: a line without one would be of no use to anybody.
   const bool to_file = !options.out.empty() && !IsStandardOutput(options.out);
   if (to_file) {
-    if (cli.output().force) ::unlink(options.out.c_str());
-    TOUCHSTONE_RETURN_IF_ERROR(WriteOwnersFile(options.out, token + "\n", O_EXCL));
+    TOUCHSTONE_RETURN_IF_ERROR(WriteOutputFile(options.out, token + "\n", cli.output().force, kOwnerAlone));
   }
   if (!options.add_to.empty()) TOUCHSTONE_RETURN_IF_ERROR(AddLine(options.add_to, line));
   if (cli.output().json) {

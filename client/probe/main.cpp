@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "server/base/out_of_memory.h"
 #include "server/base/text.h"
 #include "server/service/channel.h"
 
@@ -82,5 +83,5 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  return Probe(options);
+  return touchstone::RunWithinMemory("touchstone-probe", 3, [&] { return Probe(options); });
 }

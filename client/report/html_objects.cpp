@@ -11,6 +11,7 @@
 #include "client/report/html_page.h"
 #include "client/report/svg_object.h"
 #include "client/report/words.h"
+#include "server/base/printable.h"
 
 namespace touchstone::client {
 namespace {
@@ -164,8 +165,9 @@ std::string Data(const v1::Report& report, const std::map<std::string, Object>& 
     data["objects"].push_back(std::move(one));
   }
   // "</script>" in a name must not end the element.
-  return absl::StrReplaceAll(data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
-                             {{"<", "\\u003c"}, {">", "\\u003e"}, {"&", "\\u0026"}});
+  return absl::StrReplaceAll(
+      EscapeInJson(data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)),
+      {{"<", "\\u003c"}, {">", "\\u003e"}, {"&", "\\u0026"}});
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <absl/strings/str_replace.h>
 
 #include "client/report/words.h"
+#include "server/base/printable.h"
 
 namespace touchstone::client {
 namespace {
@@ -43,7 +44,7 @@ std::string Signs(const std::string& text) {
 
 std::string Escape(absl::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : Printable(text, std::string::npos, /*keep_lines=*/true)) {
     switch (c) {
       case '&':
         out += "&amp;";

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "client/source/connection.h"
+#include "server/base/file_writer.h"
 #include "server/service/access.h"
 #include "server/service/test_certificates.h"
 

@@ -23,7 +23,9 @@ bool IsShardName(const std::string& name) {
 }
 
 bool IsManifestName(const std::string& name) {
-  return name == kManifestName || name == absl::StrCat(kManifestName, kPartSuffix) ||
+  return name == kManifestName || IsUnfinishedName(name) ||
+         // As earlier versions named it until it was whole.
+         name == absl::StrCat(kManifestName, kPartSuffix) ||
          (name.rfind("dataset.job-", 0) == 0 && name.find(".json") != std::string::npos);
 }
 

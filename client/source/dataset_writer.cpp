@@ -13,6 +13,7 @@
 
 #include "client/source/dataset_folder.h"
 #include "client/source/synced_file.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 
@@ -40,14 +41,14 @@ class DatasetWriter::FolderLock {
     if (job.job_count == 1) return absl::OkStatus();
     const std::string path =
         absl::StrCat(job.folder, "/.job-", job.job_index, "-of-", job.job_count, ".lock");
-    TOUCHSTONE_RETURN_IF_ERROR(TakeOne(path, O_RDWR | O_CREAT, LOCK_EX));
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOne(path, O_RDWR | O_CREAT | O_NOFOLLOW, LOCK_EX));
     path_ = path;
     return absl::OkStatus();
   }
 
  private:
   absl::Status TakeOne(const std::string& path, int flags, int operation) {
-    const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+    const int descriptor = OpenFile(path, flags, 0666);
     if (descriptor < 0) return FileError(errno, path, "cannot be opened");
     descriptors_.push_back(descriptor);
     if (::flock(descriptor, operation | LOCK_NB) == 0) return absl::OkStatus();

@@ -43,7 +43,7 @@ class FolderWriter : public ShardWriter {
     std::error_code error;
     std::filesystem::remove_all(part_, error);
     std::filesystem::create_directory(part_, error);
-    if (error) return FileError(error.value(), part_, "cannot be made");
+    if (error) return TellToResume(FileError(error.value(), part_, "cannot be made"));
     TOUCHSTONE_ASSIGN_OR_RETURN(csv_, SyncedFile::Create(part_ + "/touches.csv", Durability::kInFolder));
     TOUCHSTONE_RETURN_IF_ERROR(csv_->Write(session::MeasurementHeader(layout_.fingers, {})));
     const bool contact_times = layout_.FindColumn("contact_time_s") != nullptr;
@@ -87,7 +87,7 @@ class FolderWriter : public ShardWriter {
       if (arrays_[c] != nullptr)
         TOUCHSTONE_RETURN_IF_ERROR(Commit(arrays_[c].get(), layout_.columns[c].name + ".npy"));
     TOUCHSTONE_RETURN_IF_ERROR(SyncFileSystem(part_));
-    TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(part_, path_));
+    TOUCHSTONE_RETURN_IF_ERROR(RenameUnfinished(part_, path_));
     finished_ = true;
     record_.sha256 = Sha256Hex(FolderListing(files_));
     return record_;

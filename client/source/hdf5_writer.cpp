@@ -2,8 +2,8 @@
 // "unit"; the root's attributes name the objects. No time stamps, so the same samples give the same bytes.
 #include <absl/strings/str_cat.h>
 #include <hdf5.h>
+#include <unistd.h>
 
-#include <cerrno>
 #include <filesystem>
 
 #include "client/source/sample_text.h"
@@ -11,7 +11,7 @@
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/session/hdf5_file.h"
+#include "server/session/hdf5_driver.h"
 
 namespace touchstone::client {
 namespace {
@@ -63,24 +63,14 @@ class Hdf5Writer : public ShardWriter {
     record_.samples = layout.SamplesIn(shard);
   }
 
-  ~Hdf5Writer() override {
-    datasets_.clear();
-    file_.Close();
-    std::error_code ignored;
-    if (!finished_) std::filesystem::remove(part_, ignored);
-  }
+  ~Hdf5Writer() override { datasets_.clear(); }
 
   absl::Status Open() {
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // errors are ours to report
-    Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
-    // The root group keeps times of its own unless that is switched off.
-    Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
-    H5Pset_obj_track_times(creation, false);
-    errno = 0;
-    file_ = Handle(H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose);
-    if (!file_.ok()) return Failed("cannot be written");
-    Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose);
+    ::unlink(part_.c_str());  // of a run that was killed
+    absl::StatusOr<std::unique_ptr<session::NewHdf5File>> file = session::NewHdf5File::Create(part_, path_);
+    if (!file.ok()) return TellToResume(file.status());
+    file_ = *std::move(file);
+    const Handle root(H5Gopen2(file_->id(), "/", H5P_DEFAULT), H5Gclose);
     if (!WriteTexts(root, "objects", layout_.objects, false)) return Failed("an attribute cannot be written");
     for (const FileColumn& column : layout_.columns) TOUCHSTONE_RETURN_IF_ERROR(AddDataset(column));
     return absl::OkStatus();
@@ -98,25 +88,27 @@ class Hdf5Writer : public ShardWriter {
       Handle memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
       Handle space(H5Dget_space(datasets_[c]), H5Sclose);
       H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-      errno = 0;
       if (H5Dwrite(datasets_[c], Hdf5Type(column.type), memory, space, H5P_DEFAULT, values_.data()) < 0)
         return Failed("writing failed");
+      TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->written()));
     }
     written_ += rows;
     return absl::OkStatus();
   }
 
   absl::StatusOr<FinishedShard> Finish() override {
-    errno = 0;
     bool closed = true;
     for (Handle& dataset : datasets_) closed = dataset.Close() && closed;
-    if (!file_.Close() || !closed) return Failed("closing failed");
-    TOUCHSTONE_RETURN_IF_ERROR(SyncPath(part_));
-    TOUCHSTONE_ASSIGN_OR_RETURN(record_.sha256, Sha256HexOfFile(part_));
+    TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->Finish()));
+    const absl::StatusOr<std::string> sha256 = closed ? Sha256HexOfFile(part_) : Failed("closing failed");
     std::error_code error;
     record_.bytes = std::filesystem::file_size(part_, error);
-    TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(part_, path_));
-    finished_ = true;
+    if (!sha256.ok() || error) {
+      ::unlink(part_.c_str());
+      return sha256.ok() ? FileError(error.value(), path_, "cannot be examined") : sha256.status();
+    }
+    record_.sha256 = *sha256;
+    TOUCHSTONE_RETURN_IF_ERROR(RenameUnfinished(part_, path_));
     return record_;
   }
 
@@ -132,13 +124,13 @@ class Hdf5Writer : public ShardWriter {
     const uint64_t sample_bytes = std::max<uint64_t>(1, column.Values() * BytesPerValue(column.type));
     std::vector<hsize_t> chunk = size;
     chunk[0] = std::clamp<uint64_t>(kChunkBytes / sample_bytes, 1, record_.samples);
-    Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    H5Pset_obj_track_times(creation, false);
+    const Handle creation = session::WithoutTimes(H5P_DATASET_CREATE);
     H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data());
     if (column.shape.size() >= 2) H5Pset_deflate(creation, kImageDeflateLevel);
     Handle space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose);
-    Handle dataset(H5Dcreate2(file_, column.name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
-                   H5Dclose);
+    Handle dataset(
+        H5Dcreate2(file_->id(), column.name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+        H5Dclose);
     if (!dataset.ok()) return Failed("a dataset cannot be made");
     if (!WriteTexts(dataset, "unit", {std::string(UnitSymbol(column.unit))}, true))
       return Failed("an attribute cannot be written");
@@ -147,18 +139,18 @@ class Hdf5Writer : public ShardWriter {
   }
 
   absl::Status Failed(const char* what) const {
-    return FileError(errno == 0 ? EIO : errno, path_, absl::StrCat(what, " (HDF5)"));
+    if (!file_->written().ok()) return TellToResume(file_->written());
+    return absl::InternalError(absl::StrCat(path_, ": ", what, " (HDF5)"));
   }
 
   const DatasetLayout& layout_;
   std::string path_;
   std::string part_;
   FinishedShard record_;
-  Handle file_{-1, H5Fclose};
+  std::unique_ptr<session::NewHdf5File> file_;
   std::vector<Handle> datasets_;
   uint64_t written_ = 0;
   std::string values_;
-  bool finished_ = false;
 };
 
 }  // namespace

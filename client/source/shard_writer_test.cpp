@@ -9,10 +9,12 @@
 
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <map>
 
 #include "client/source/measurement_csv.h"
 #include "client/source/npy.h"
+#include "server/base/full_disk.h"
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
 
@@ -227,17 +229,34 @@ TEST_F(ShardWriterTest, AnUnfinishedShardLeavesNothing) {
 }
 
 TEST_F(ShardWriterTest, AFullDiskIsTold) {
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  const DatasetLayout layout = Layout(ShardFormat::kWebDataset, "full");
-  // The .part is a link to a device that is always full.
-  fs::create_symlink("/dev/full", layout.folder + "/shard-000001.tar.part");
+  for (const ShardFormat format : {ShardFormat::kWebDataset, ShardFormat::kFolder, ShardFormat::kHdf5}) {
+    SCOPED_TRACE(ShardFormatName(format));
+    const DatasetLayout layout = Layout(format, ShardFormatName(format) + std::string("-full"));
+    auto writer = CreateShardWriter(layout, 1);
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    absl::Status status;
+    {
+      const FullDisk full;
+      status = (*writer)->Append(MakeBatch(10, 10, format != ShardFormat::kHdf5), 0, 10);
+      if (status.ok()) status = (*writer)->Finish().status();
+    }
+    EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("Make room and run the same command again"));
+    writer->reset();
+    EXPECT_TRUE(fs::is_empty(layout.folder));
+  }
+}
+
+TEST_F(ShardWriterTest, NothingIsWrittenThroughALinkThatStandsInTheWay) {
+  const DatasetLayout layout = Layout(ShardFormat::kWebDataset, "link");
+  const std::string kept = layout.folder + "/of another";
+  std::ofstream(kept) << "kept";
+  fs::create_symlink(kept, layout.folder + "/shard-000001.tar.part");
   auto writer = CreateShardWriter(layout, 1);
   ASSERT_TRUE(writer.ok()) << writer.status();
-  absl::Status status = (*writer)->Append(MakeBatch(10, 10, true), 0, 10);
-  if (status.ok()) status = (*writer)->Finish().status();
-  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("No space left"));
-  EXPECT_FALSE(fs::exists(layout.folder + "/shard-000001.tar"));
+  ASSERT_TRUE((*writer)->Append(MakeBatch(10, 10, true), 0, 10).ok());
+  EXPECT_TRUE((*writer)->Finish().ok());
+  EXPECT_EQ(ReadFile(kept).value(), "kept");
 }
 
 TEST_F(ShardWriterTest, ABatchThatBreaksTheHeadersPromiseIsRefused) {

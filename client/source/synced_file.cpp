@@ -6,8 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 
 #include "server/base/status.h"
@@ -33,43 +31,18 @@ struct SyncedFile::Hash {
   EVP_MD_CTX* context;
 };
 
-absl::Status FileError(int error_number, const std::string& path, absl::string_view what) {
-  const std::string message = absl::StrCat(path, ": ", what, ": ", std::strerror(error_number));
-  switch (error_number) {
-    case ENOSPC:
-    case EDQUOT:
-      return absl::ResourceExhaustedError(
-          absl::StrCat(message, ". Make room and run the same command again: it resumes where it stopped"));
-    case EIO:
-      return absl::DataLossError(message);
-    default:
-      return absl::InvalidArgumentError(message);
-  }
-}
-
-absl::Status SyncPath(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return FileError(errno, path, "cannot be opened to be synced");
-  const int failed = ::fsync(descriptor) != 0 ? errno : 0;
-  ::close(descriptor);
-  // Some file systems do not sync folders; that is no error of ours.
-  if (failed != 0 && failed != EINVAL && failed != ENOTSUP)
-    return FileError(failed, path, "cannot be synced");
-  return absl::OkStatus();
-}
-
-absl::Status RenameSynced(const std::string& from, const std::string& to) {
-  if (std::rename(from.c_str(), to.c_str()) != 0) return FileError(errno, to, "cannot be renamed into place");
-  const std::string folder = std::filesystem::path(to).parent_path().string();
-  return SyncPath(folder.empty() ? "." : folder);
+absl::Status TellToResume(const absl::Status& failed) {
+  if (!absl::IsResourceExhausted(failed)) return failed;
+  return absl::ResourceExhaustedError(absl::StrCat(
+      failed.message(), ". Make room and run the same command again: it resumes where it stopped"));
 }
 
 absl::Status SyncFileSystem(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = OpenFile(path, O_RDONLY);
   if (descriptor < 0) return FileError(errno, path, "cannot be opened to be synced");
   const int failed = ::syncfs(descriptor) != 0 ? errno : 0;
   ::close(descriptor);
-  return failed == 0 ? absl::OkStatus() : FileError(failed, path, "cannot be synced");
+  return failed == 0 ? absl::OkStatus() : TellToResume(FileError(failed, path, "cannot be synced"));
 }
 
 absl::StatusOr<std::unique_ptr<SyncedFile>> SyncedFile::Create(const std::string& path,
@@ -78,16 +51,19 @@ absl::StatusOr<std::unique_ptr<SyncedFile>> SyncedFile::Create(const std::string
   file->path_ = path;
   file->durability_ = durability;
   file->written_path_ = durability == Durability::kAlone ? path + kPartSuffix : path;
-  file->descriptor_ = ::open(file->written_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file->descriptor_ < 0) return FileError(errno, path, "cannot be written");
+  TOUCHSTONE_ASSIGN_OR_RETURN(file->file_, ReplaceUnfinished(file->written_path_, path));
   file->hash_ = std::make_unique<Hash>();
   return file;
 }
 
-SyncedFile::~SyncedFile() {
-  if (descriptor_ < 0) return;
-  ::close(descriptor_);
-  ::unlink(written_path_.c_str());
+SyncedFile::~SyncedFile() = default;
+
+absl::StatusOr<std::unique_ptr<FileWriter>> ReplaceUnfinished(const std::string& part,
+                                                              const std::string& called) {
+  ::unlink(part.c_str());
+  absl::StatusOr<std::unique_ptr<FileWriter>> file = FileWriter::Create(part, 0666, called);
+  if (!file.ok()) return TellToResume(file.status());
+  return file;
 }
 
 absl::Status SyncedFile::Write(absl::string_view data) {
@@ -97,13 +73,7 @@ absl::Status SyncedFile::Write(absl::string_view data) {
 }
 
 absl::Status SyncedFile::Flush() {
-  size_t done = 0;
-  while (done < buffer_.size()) {
-    const ssize_t written = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return FileError(errno, path_, "writing failed");
-    done += static_cast<size_t>(written);
-  }
+  TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->Write(buffer_)));
   EVP_DigestUpdate(hash_->context, buffer_.data(), buffer_.size());
   bytes_ += buffer_.size();
   buffer_.clear();
@@ -112,13 +82,17 @@ absl::Status SyncedFile::Flush() {
 
 absl::StatusOr<FileDigest> SyncedFile::Commit() {
   TOUCHSTONE_RETURN_IF_ERROR(Flush());
-  if (durability_ == Durability::kAlone && ::fsync(descriptor_) != 0)
-    return FileError(errno, path_, "cannot be synced");
-  const int closed = ::close(descriptor_);
-  descriptor_ = -1;
-  if (closed != 0) return FileError(errno, path_, "closing failed");
-  if (durability_ == Durability::kAlone) TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(written_path_, path_));
+  TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->Close(/*sync=*/durability_ == Durability::kAlone)));
+  if (durability_ == Durability::kAlone) TOUCHSTONE_RETURN_IF_ERROR(RenameUnfinished(written_path_, path_));
   return FileDigest{bytes_, hash_->Hex()};
+}
+
+absl::Status RenameUnfinished(const std::string& part, const std::string& path) {
+  const absl::Status renamed = RenameSynced(part, path);
+  if (renamed.ok()) return renamed;
+  std::error_code ignored;
+  if (::unlink(part.c_str()) != 0) std::filesystem::remove_all(part, ignored);
+  return TellToResume(renamed);
 }
 
 }  // namespace touchstone::client

@@ -9,6 +9,8 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
+#include "server/base/file_writer.h"
+
 namespace touchstone::client {
 
 inline constexpr char kPartSuffix[] = ".part";
@@ -25,10 +27,10 @@ enum class Durability {
 
 class SyncedFile {
  public:
-  // Opens `path`.part, or `path` itself in a folder of its own; empties what is there.
+  // Makes `path`.part, or `path` itself in a folder of its own, in place of what is there.
   static absl::StatusOr<std::unique_ptr<SyncedFile>> Create(const std::string& path,
                                                             Durability durability = Durability::kAlone);
-  ~SyncedFile();  // without Commit: removes what was written
+  ~SyncedFile();  // without Commit: what was written is removed
 
   // RESOURCE_EXHAUSTED if the disk is full.
   absl::Status Write(absl::string_view data);
@@ -44,21 +46,20 @@ class SyncedFile {
   std::string path_;          // in the end
   std::string written_path_;  // until then
   Durability durability_ = Durability::kAlone;
-  int descriptor_ = -1;
+  std::unique_ptr<FileWriter> file_;
   std::string buffer_;
   uint64_t bytes_ = 0;
   std::unique_ptr<Hash> hash_;
 };
 
-// What went wrong with a path, from errno: the code and words for it ("... is full", "... may
-// not be written").
-absl::Status FileError(int error_number, const std::string& path, absl::string_view what);
+// An error of a shard's file; where there was no room it says how to go on.
+absl::Status TellToResume(const absl::Status& failed);
 
-// Renames and syncs the folder around, so that the new name survives a power cut.
-absl::Status RenameSynced(const std::string& from, const std::string& to);
-
-// Syncs a file or a folder that already stands.
-absl::Status SyncPath(const std::string& path);
+// Makes a file that is written under a name for what is not finished, in place of what a killed run left there; `called`: as
+// messages name it. And renames what is finished; what cannot be is removed.
+absl::StatusOr<std::unique_ptr<FileWriter>> ReplaceUnfinished(const std::string& part,
+                                                              const std::string& called);
+absl::Status RenameUnfinished(const std::string& part, const std::string& path);
 
 // Syncs everything on the file system that holds `path`: one call for a folder of many files.
 absl::Status SyncFileSystem(const std::string& path);

@@ -10,11 +10,8 @@
 namespace touchstone {
 
 // Writes a file that is whole or absent, and never over one that is there: ALREADY_EXISTS, with the path as its message. Of
-// several writers of one name, in whichever processes and containers, one succeeds. It is written as .NAME.*.draft first.
+// several writers of one name, in whichever processes and containers, one succeeds. It is written beside its place first (UnfinishedPathOf).
 absl::Status WriteNewFile(const std::string& path, absl::string_view data);
-
-// Makes the name of a file that was written, linked or renamed outlive a power cut, by syncing its folder.
-absl::Status SyncFolderOf(const std::string& path);
 
 // Removes what killed writers left in the folder, if it is at least so old: younger drafts may be being written.
 void RemoveOldDrafts(const std::string& folder, std::chrono::seconds age);

@@ -14,12 +14,6 @@
 namespace touchstone {
 namespace {
 
-size_t Files(const TestFolder& folder) {
-  size_t files = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.path())) ++files;
-  return files;
-}
-
 TEST(WriteNewFile, OfManyWritersOneSucceedsAndItsBytesStay) {
   const TestFolder folder;
   for (int round = 0; round < 20; ++round) {
@@ -42,7 +36,7 @@ TEST(WriteNewFile, OfManyWritersOneSucceedsAndItsBytesStay) {
     ASSERT_NE(written, -1);
     EXPECT_EQ(ReadFile(path).value(), std::string(2000, static_cast<char>('a' + written)));
   }
-  EXPECT_EQ(Files(folder), 20u) << "drafts stayed";
+  EXPECT_EQ(folder.Entries(), 20u) << "drafts stayed";
 }
 
 TEST(WriteNewFile, SaysWhereItCannotWrite) {
@@ -57,9 +51,9 @@ TEST(RemoveOldDrafts, TakesWhatIsOldAndADraft) {
   for (const char* name : {".m.yaml.1f.draft", ".m.yaml.1f.draft.part", "m.yaml", ".hidden"})
     std::ofstream(folder.Path(name)) << "x";
   RemoveOldDrafts(folder.path(), std::chrono::hours(1));
-  EXPECT_EQ(Files(folder), 4u);
+  EXPECT_EQ(folder.Entries(), 4u);
   RemoveOldDrafts(folder.path(), std::chrono::seconds(0));
-  EXPECT_EQ(Files(folder), 2u);
+  EXPECT_EQ(folder.Entries(), 2u);
   EXPECT_TRUE(std::filesystem::exists(folder.Path("m.yaml")));
 }
 

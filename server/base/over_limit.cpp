@@ -24,4 +24,9 @@ absl::Status Busy(absl::string_view what, absl::string_view limit_name, double l
                                                    "): try again later, or at another one"));
 }
 
+absl::Status NoMemoryFor(absl::string_view what) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat("there is not enough memory for this ", what, ": try again later"));
+}
+
 }  // namespace touchstone

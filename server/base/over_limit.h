@@ -19,4 +19,7 @@ absl::Status OverLimit(absl::string_view asked, double value, absl::string_view 
 // what there is; clients know by "try again" that waiting helps.
 absl::Status Busy(absl::string_view what, absl::string_view limit_name, double limit);
 
+// RESOURCE_EXHAUSTED: "there is not enough memory for this request: try again later".
+absl::Status NoMemoryFor(absl::string_view what);
+
 }  // namespace touchstone

@@ -32,6 +32,21 @@ TEST(Printable, WhatIsNoUtf8IsShownAsBytes) {
             "\\xc2\\x9b2J");
 }
 
+TEST(Printable, NothingIsInvisibleOrTurnsTheDirectionOfWhatFollows) {
+  // Left-to-right and right-to-left overrides and isolates, zero width, soft hyphen, line and paragraph separators, tags.
+  for (const char* text : {"\u202e", "\u202d", "\u2066", "\u200b", "\u200f", "\u00ad", "\u2028", "\u2029",
+                           "\ufeff", "\u061c", "\u0085", "\U000e0041"}) {
+    EXPECT_FALSE(IsPrintableLine(std::string("a") + text)) << text;
+    EXPECT_EQ(Printable(text, 1000, /*keep_lines=*/true).substr(0, 2), "\\x");
+  }
+  EXPECT_EQ(Printable("a\u202eb", 1000), "a\\xe2\\x80\\xaeb");
+}
+
+TEST(EscapeInJson, SaysTheSameVisibly) {
+  EXPECT_EQ(EscapeInJson("{\n  \"name\": \"J\u00fcrgen \u202egpj\U000e0041\"\n}"),
+            "{\n  \"name\": \"J\u00fcrgen \\u202egpj\\udb40\\udc41\"\n}");
+}
+
 TEST(Printable, CutsBetweenCharactersAndSaysSo) {
   EXPECT_EQ(Printable("abcdef", 3), "abc...");
   EXPECT_EQ(Printable("abc", 3), "abc");

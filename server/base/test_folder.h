@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <string>
 
 #include "server/base/check.h"
@@ -22,6 +23,11 @@ class TestFolder {
   TestFolder& operator=(const TestFolder&) = delete;
 
   const std::string& path() const { return path_; }
+  // How many files and folders it has.
+  size_t Entries() const {
+    return static_cast<size_t>(
+        std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator()));
+  }
   // Of a file in it.
   std::string Path(const std::string& name) const { return path_ + "/" + name; }
 

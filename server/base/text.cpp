@@ -3,10 +3,8 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <fcntl.h>
 #include <openssl/evp.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -16,7 +14,6 @@
 #include <fstream>
 #include <memory>
 
-#include "server/base/new_file.h"
 #include "server/base/status.h"
 
 namespace touchstone {
@@ -81,10 +78,14 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
   return absl::StrCat("; known: ", list);
 }
 
-std::string Sha256Hex(absl::string_view data) {
+std::string Sha256Hex(const std::vector<absl::string_view>& pieces) {
   const Digest digest = NewSha256();
-  EVP_DigestUpdate(digest.get(), data.data(), data.size());
+  for (const absl::string_view piece : pieces) EVP_DigestUpdate(digest.get(), piece.data(), piece.size());
   return Finish(digest);
+}
+
+std::string Sha256Hex(absl::string_view data) {
+  return Sha256Hex(std::vector<absl::string_view>{data});
 }
 
 absl::StatusOr<std::string> Sha256HexOfFile(const std::string& path) {
@@ -138,33 +139,6 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, uint64_t limit_byt
     return absl::DataLossError(
         absl::StrCat(path, ": ended after ", file.gcount(), " of ", data.size(), " bytes"));
   return data;
-}
-
-absl::Status WriteFileAtomically(const std::string& path, absl::string_view data) {
-  const std::string part = absl::StrCat(path, ".part");
-  const auto failed = [&](absl::string_view what) {
-    const std::string reason = std::strerror(errno);
-    ::unlink(part.c_str());
-    return absl::UnavailableError(absl::StrCat(path, ": ", what, " failed: ", reason));
-  };
-  const int file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) return failed("creating the file");
-  for (size_t done = 0; done < data.size();) {
-    const ssize_t written = ::write(file, data.data() + done, data.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) {
-      ::close(file);
-      return failed("writing");
-    }
-    done += written;
-  }
-  if (::fsync(file) != 0) {
-    ::close(file);
-    return failed("syncing");
-  }
-  ::close(file);
-  if (::rename(part.c_str(), path.c_str()) != 0) return failed("renaming");
-  return SyncFolderOf(path);
 }
 
 }  // namespace touchstone

@@ -15,6 +15,8 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
 
 // SHA-256 of `data` as 64 lower-case hexadecimal digits.
 std::string Sha256Hex(absl::string_view data);
+// Of pieces one after the other.
+std::string Sha256Hex(const std::vector<absl::string_view>& pieces);
 
 // SHA-256 of a file's bytes, read in blocks.
 absl::StatusOr<std::string> Sha256HexOfFile(const std::string& path);
@@ -30,8 +32,5 @@ absl::StatusOr<double> ParseNumber(absl::string_view text);
 
 // Reads a whole file of at most `limit_bytes`; the error names the path and why.
 absl::StatusOr<std::string> ReadFile(const std::string& path, uint64_t limit_bytes = uint64_t{1} << 32);
-
-// Writes to `path`.part, syncs, then renames: the file is whole or absent.
-absl::Status WriteFileAtomically(const std::string& path, absl::string_view data);
 
 }  // namespace touchstone

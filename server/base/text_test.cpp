@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "server/base/test_folder.h"
 
@@ -44,15 +45,10 @@ TEST(DurationInWords, HasTwoUnitsAtMost) {
   EXPECT_EQ(DurationInWords(7500), "2 h 5 min");
 }
 
-TEST(WriteFileAtomically, LeavesAWholeFileOrNone) {
-  const TestFolder test_folder;
-  const std::string& folder = test_folder.path();
-  const std::string path = folder + "/atomic.txt";
-  ASSERT_TRUE(WriteFileAtomically(path, "hello").ok());
-  EXPECT_EQ(ReadFile(path).value(), "hello");
-  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
-  EXPECT_FALSE(WriteFileAtomically(folder + "/absent/x", "hello").ok());
-  EXPECT_THAT(ReadFile(path, 3).status().message(), HasSubstr("5 bytes"));
+TEST(ReadFile, RefusesOneThatIsTooLarge) {
+  const TestFolder folder;
+  std::ofstream(folder.Path("five")) << "hello";
+  EXPECT_THAT(ReadFile(folder.Path("five"), 3).status().message(), HasSubstr("5 bytes"));
 }
 
 }  // namespace

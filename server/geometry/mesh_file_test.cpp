@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "server/base/file_writer.h"
 #include "server/base/random.h"
 #include "server/base/text.h"
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"

@@ -2,6 +2,7 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <thread>
 
+#include "server/base/file_writer.h"
 #include "server/base/manual_clock.h"
 #include "server/service/access.h"
 #include "server/service/server.h"

@@ -9,8 +9,11 @@
 #include <chrono>
 #include <iterator>
 
+#include "server/base/out_of_memory.h"
+#include "server/base/over_limit.h"
 #include "server/base/printable.h"
 #include "server/service/access.h"
+#include "server/service/convert.h"
 #include "server/service/metrics.h"
 
 namespace touchstone::service {
@@ -71,8 +74,13 @@ class CallInterceptor : public grpc::experimental::Interceptor {
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA))
       methods->GetSendInitialMetadata()->insert({kRequestId, id_});
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS))
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
+      // gRPC makes UNKNOWN of whatever a handler throws.
+      if (methods->GetSendStatus().error_code() == grpc::StatusCode::UNKNOWN &&
+          OutOfMemoryCount() != out_of_memory_)
+        methods->ModifySendStatus(ToGrpc(NoMemoryFor("call")));
       code_ = methods->GetSendStatus().error_code();
+    }
     methods->Proceed();
   }
 
@@ -80,6 +88,7 @@ class CallInterceptor : public grpc::experimental::Interceptor {
   CallMetrics* const metrics_;
   const std::string method_;
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  const uint64_t out_of_memory_ = OutOfMemoryCount();
   std::string id_ = NewRequestId(), trace_id_;
   int code_ = grpc::StatusCode::CANCELLED;  // until there is another to send
 };

@@ -43,8 +43,9 @@ class OneLine : public spdlog::custom_flag_formatter {
 class JsonMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& to) override {
-    const std::string text = nlohmann::json(std::string(message.payload.data(), message.payload.size()))
-                                 .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    const std::string text =
+        EscapeInJson(nlohmann::json(std::string(message.payload.data(), message.payload.size()))
+                         .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
     to.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
@@ -96,7 +97,8 @@ void AnnounceListening(const std::string& listen, int port) {
 }
 
 int ReportStartError(const char* program, const absl::Status& status) {
-  std::fprintf(stderr, "%s: error: %s\n", program, std::string(status.message()).c_str());
+  std::fprintf(stderr, "%s: error: %s\n", program,
+               Printable(status.message(), std::string::npos, /*keep_lines=*/true).c_str());
   return absl::IsUnavailable(status) ? 3 : 2;
 }
 

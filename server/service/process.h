@@ -29,6 +29,8 @@ bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_b
 void LogStopped();
 // Exit status of a deaf process: start it anew.
 inline constexpr int kExitDeaf = 70;
+// EX_OSERR: it gets no more memory where a call could not be refused instead.
+inline constexpr int kExitOutOfMemory = 71;
 
 // The life of a server's process, as its exit status: log, start, serving until a signal, draining. `Flags` has
 // log_level, log_json and done; `options_of` gives the options that every server has; `start` makes from the

@@ -134,8 +134,7 @@ class GuardedHandler : public MethodHandler {
       reservations_.emplace(request, *std::move(reservation));
       return request;
     } catch (const std::bad_alloc&) {
-      *status = ToGrpc(
-          absl::ResourceExhaustedError("there is not enough memory for this request: try again later"));
+      *status = ToGrpc(NoMemoryFor("request"));
       return nullptr;
     }
   }

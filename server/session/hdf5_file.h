@@ -1,45 +1,27 @@
-// HDF5 handles, and an HDF5 file as named columns of numbers and texts.
+// An HDF5 file as named columns of numbers and texts.
 #pragma once
 
 #include <hdf5.h>
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
+
+#include "server/session/hdf5_driver.h"
+#include "server/session/hdf5_handle.h"
 
 namespace touchstone::session {
 
-// An HDF5 handle with the function that closes it.
-class Hdf5Handle {
- public:
-  Hdf5Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  Hdf5Handle(Hdf5Handle&& other) noexcept : id_(other.id_), close_(other.close_) { other.id_ = -1; }
-  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
-    std::swap(id_, other.id_);
-    std::swap(close_, other.close_);
-    return *this;
-  }
-  ~Hdf5Handle() { Close(); }
-  bool ok() const { return id_ >= 0; }
-  operator hid_t() const { return id_; }
-  bool Close() {
-    if (id_ < 0) return true;
-    const bool closed = close_(id_) >= 0;
-    id_ = -1;
-    return closed;
-  }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-// Writes datasets one after the other; names may have groups ("/images/png"). The first error is
-// reported at the end. The file is whole or absent: it stands beside its place as NAME.part until Finish.
+// Writes datasets one after the other; names may have groups ("/images/png"). Each has a checksum of its values as attribute
+// "sha256" (64 hexadecimal digits, of the bytes as they stand there), beside those that HDF5 keeps of all that is no
+// values; the root's attribute "checksums" is that of all names and checksums. The first error is reported at the end. The file is whole or absent: it stands beside its place until Finish.
 class Hdf5Columns {
  public:
   explicit Hdf5Columns(const std::string& path);
@@ -58,16 +40,19 @@ class Hdf5Columns {
   absl::Status Finish();
 
  private:
-  void Write(const std::string& name, const std::string& unit, hid_t file_type, hid_t memory_type,
-             const void* values, const std::vector<hsize_t>& shape);
+  // Values of one type, end to end; strings of their bytes one after the other.
+  void Write(const std::string& name, const std::string& unit, hid_t type,
+             const std::vector<absl::string_view>& values, const std::vector<hsize_t>& shape);
 
   const std::string path_, part_;
-  Hdf5Handle file_;
-  std::string failed_;  // the dataset that could not be written
-  bool finished_ = false;
+  std::unique_ptr<NewHdf5File> file_;
+  absl::Status failed_;
+  std::map<std::string, std::string> checksums_;  // by dataset
 };
 
-// Reads them again. Errors name the file and the dataset.
+// Reads them again. Errors name the file and the dataset. Nothing is read from anywhere but this file: no link, virtual
+// dataset, external storage or filter of others. What a dataset says of its size is held against the bytes that it has
+// before there is memory for it. DATA_LOSS: the values are not those that were written.
 class Hdf5ColumnsReader {
  public:
   static absl::StatusOr<Hdf5ColumnsReader> Open(const std::string& path);
@@ -81,12 +66,20 @@ class Hdf5ColumnsReader {
   absl::StatusOr<std::vector<uint8_t>> Pixels(const std::string& name, uint64_t count) const;
 
  private:
-  Hdf5ColumnsReader(std::string path, Hdf5Handle file) : path_(std::move(path)), file_(std::move(file)) {}
-  absl::StatusOr<Hdf5Handle> Dataset(const std::string& name, uint64_t* count) const;
+  struct Checked;
+  Hdf5ColumnsReader(std::string path, Hdf5Handle file, bool has_checksums)
+      : path_(std::move(path)), file_(std::move(file)), has_checksums_(has_checksums) {}
+  bool IsLink(const std::string& name) const;
+  absl::StatusOr<Checked> Dataset(const std::string& name) const;
+  absl::StatusOr<Checked> Dataset(const std::string& name, uint64_t count) const;
+  // Its values as `type`, and whether they are those that were written.
+  absl::Status Read(const std::string& name, const Checked& dataset, hid_t type, size_t value_bytes,
+                    void* values) const;
   absl::Status Wrong(const std::string& name, const std::string& what) const;
 
   std::string path_;
   Hdf5Handle file_;
+  bool has_checksums_;  // files of earlier versions have none
 };
 
 }  // namespace touchstone::session

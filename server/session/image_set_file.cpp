@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/image/encode.h"
@@ -184,27 +185,74 @@ absl::StatusOr<v1::ImageSetFiles> FormatImageSet(const ImageSet& set) {
   return files;
 }
 
-absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::string& folder) {
+namespace {
+
+absl::Status MakeFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  return error ? FileError(error.value(), path, "cannot be made") : absl::OkStatus();
+}
+
+// In the order in which they are written.
+std::vector<std::string> NamesOf(const v1::ImageSetFiles& files,
+                                 const std::map<std::string, std::string>& others) {
+  std::vector<std::string> names;
+  for (const v1::ImageFile& file : files.files()) names.push_back(file.name());
+  names.emplace_back(kCameraYaml);
+  for (const auto& [name, data] : others) names.push_back(name);
+  names.emplace_back(kImagesCsv);
+  return names;
+}
+
+absl::Status FillFolder(const v1::ImageSetFiles& files, const std::map<std::string, std::string>& others,
+                        const std::string& folder) {
+  const auto write = [&](const std::string& name, absl::string_view data) -> absl::Status {
+    const std::string path = PathIn(folder, name);
+    TOUCHSTONE_RETURN_IF_ERROR(MakeFolder(fs::path(path).parent_path().string()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto file, FileWriter::Create(path));
+    TOUCHSTONE_RETURN_IF_ERROR(file->Write(data));
+    return file->Close();
+  };
+  TOUCHSTONE_RETURN_IF_ERROR(MakeFolder(folder));
+  for (const v1::ImageFile& file : files.files()) TOUCHSTONE_RETURN_IF_ERROR(write(file.name(), file.png()));
+  TOUCHSTONE_RETURN_IF_ERROR(write(kCameraYaml, files.camera_yaml()));
+  for (const auto& [name, data] : others) TOUCHSTONE_RETURN_IF_ERROR(write(name, data));
+  TOUCHSTONE_RETURN_IF_ERROR(write(kImagesCsv, files.images_csv()));
+  return SyncPath(folder);
+}
+
+// Whole files of these names, into a folder that has others.
+absl::Status MoveFiles(const std::vector<std::string>& names, const std::string& from,
+                       const std::string& to) {
+  for (const std::string& name : names) {
+    const std::string path = PathIn(to, name);
+    TOUCHSTONE_RETURN_IF_ERROR(MakeFolder(fs::path(path).parent_path().string()));
+    TOUCHSTONE_RETURN_IF_ERROR(RenameSynced(PathIn(from, name), path));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::string& folder,
+                                const std::map<std::string, std::string>& others) {
   if (IsImageSetFolder(folder))
     return absl::AlreadyExistsError(
         absl::StrCat(PathIn(folder, kImagesCsv), " exists already; a new folder was expected"));
-  const auto make_folder = [](const std::string& path) {
-    std::error_code error;
-    fs::create_directories(path, error);
-    if (!error) return absl::OkStatus();
-    return absl::InvalidArgumentError(absl::StrCat(path, " cannot be made: ", error.message()));
-  };
-  TOUCHSTONE_RETURN_IF_ERROR(make_folder(folder));
-  for (const v1::ImageFile& file : files.files()) {
+  for (const v1::ImageFile& file : files.files())
     // The names may come from another machine.
     if (absl::Status status = CheckPictureName(file.name()); !status.ok())
       return absl::InvalidArgumentError(absl::StrCat(folder, ": picture ", status.message()));
-    const std::string path = PathIn(folder, file.name());
-    TOUCHSTONE_RETURN_IF_ERROR(make_folder(fs::path(path).parent_path().string()));
-    TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(path, file.png()));
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically(PathIn(folder, kCameraYaml), files.camera_yaml()));
-  return WriteFileAtomically(PathIn(folder, kImagesCsv), files.images_csv());
+  // "photos/" is photos.
+  const std::string place = (fs::path(folder) / "").parent_path().string();
+  std::error_code error;
+  const bool is_there = fs::is_directory(place, error);
+  const std::string part = UnfinishedPathOf(is_there ? PathIn(place, "set") : place);
+  absl::Status status = FillFolder(files, others, part);
+  if (status.ok())
+    status = is_there ? MoveFiles(NamesOf(files, others), part, place) : RenameSynced(part, place);
+  fs::remove_all(part, error);
+  return status;
 }
 
 absl::Status WriteImageSet(const ImageSet& set, const std::string& folder) {

@@ -2,6 +2,7 @@
 // same checks; errors name file, line, column, what is wrong and what was expected, and nothing is dropped.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include <absl/status/status.h>
@@ -40,9 +41,11 @@ absl::StatusOr<v1::ImageSetFiles> ReadImageSetFiles(const std::string& folder);
 // The files of a set; ParseImageSet gives the same set again.
 absl::StatusOr<v1::ImageSetFiles> FormatImageSet(const ImageSet& set);
 
-// Writes the files into a folder, which is made if need be; images.csv last, so that a folder with one is whole.
-// ALREADY_EXISTS if an image set stands there.
-absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::string& folder);
+// Writes the files, and `others` by their names: the measurement file of a joint set, masks. A folder that is not there is made with all
+// of them or not at all; into one that is there images.csv comes last, so that a folder with one is whole. ALREADY_EXISTS if
+// an image set stands there.
+absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::string& folder,
+                                const std::map<std::string, std::string>& others = {});
 absl::Status WriteImageSet(const ImageSet& set, const std::string& folder);
 
 // SHA-256 as `sha256sum images.csv camera.yaml PICTURE ... | sha256sum` prints it, pictures in the order of the rows.

@@ -18,11 +18,7 @@ constexpr int kMaxFingers = 16;
 
 absl::Status JournalFile::EnsureSession(const JournalSession& session) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_RETURN_IF_ERROR(CheckName("a session's name", session.name));
-  if (session.fingers < 1 || session.fingers > kMaxFingers || !(session.spacing_m > 0))
-    return Wrong(absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
-                              ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart; 1 to ",
-                              kMaxFingers, " and more than 0 mm are possible"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckHead(session));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(session.name));
   if (!known) return Write([&] { return InsertSession(file_.get(), session).status(); });
   if (known->fingers == session.fingers && known->spacing_m == session.spacing_m) return absl::OkStatus();
@@ -31,6 +27,34 @@ absl::Status JournalFile::EnsureSession(const JournalSession& session) {
                    ShortestNumber(known->spacing_m * kMillimetresPerMetre), " mm apart, not ",
                    session.fingers, " fingers ", ShortestNumber(session.spacing_m * kMillimetresPerMetre),
                    " mm apart; begin a session of another name"));
+}
+
+absl::Status JournalFile::CheckHead(const JournalSession& session) const {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName("a session's name", session.name));
+  if (session.fingers >= 1 && session.fingers <= kMaxFingers && session.spacing_m > 0)
+    return absl::OkStatus();
+  return Wrong(absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
+                            ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart; 1 to ",
+                            kMaxFingers, " and more than 0 mm are possible"));
+}
+
+absl::Status JournalFile::AddSession(const SessionContent& content) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const JournalSession& session = content.session;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckHead(session));
+  return Write([&]() -> absl::Status {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> there, FindSession(session.name));
+    if (there)
+      return absl::AlreadyExistsError(absl::StrCat(Called(), "there is a session '", session.name,
+                                                   "' already; give the new one another name"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t session_id, InsertSession(file_.get(), session));
+    const Known known{session_id, session.fingers, session.spacing_m};
+    SessionTally tally;
+    TOUCHSTONE_RETURN_IF_ERROR(AppendFinished(session.name, known, content.touches, content.series, &tally));
+    for (const JournalImage& image : content.images)
+      TOUCHSTONE_RETURN_IF_ERROR(AppendImage(session.name, known, image, &tally));
+    return WriteTally(file_.get(), session_id, tally);
+  });
 }
 
 absl::StatusOr<std::vector<JournalSession>> JournalFile::Sessions() const {
@@ -111,28 +135,33 @@ absl::Status JournalFile::AddImage(const std::string& session, const JournalImag
   const std::lock_guard<std::mutex> lock(mutex_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
-    JournalImage image = given;
     TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
-    {
-      SqliteStatement next =
-          file_->Prepare("SELECT coalesce(max(number) + 1, 0) FROM image WHERE session_id = ?");
-      next.Bind(known.session_id);
-      TOUCHSTONE_RETURN_IF_ERROR(next.Step().status());
-      image.number = static_cast<uint64_t>(next.Integer(0));
-    }
-    if (image.id.empty()) image.id = absl::StrCat("image-", image.number);
-    TOUCHSTONE_RETURN_IF_ERROR(CheckName("a picture's id", image.id));
-    {
-      SqliteStatement same = file_->Prepare("SELECT 1 FROM image WHERE session_id = ? AND id = ?");
-      same.Bind(known.session_id).Bind(image.id);
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, same.Step());
-      if (found)
-        return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a picture '",
-                                                     image.id, "' already; give this one an id of its own"));
-    }
-    TOUCHSTONE_RETURN_IF_ERROR(InsertImage(file_.get(), known.session_id, image, &tally));
+    TOUCHSTONE_RETURN_IF_ERROR(AppendImage(session, known, given, &tally));
     return WriteTally(file_.get(), known.session_id, tally);
   });
+}
+
+absl::Status JournalFile::AppendImage(const std::string& session, const Known& known,
+                                      const JournalImage& given, SessionTally* tally) {
+  JournalImage image = given;
+  {
+    SqliteStatement next =
+        file_->Prepare("SELECT coalesce(max(number) + 1, 0) FROM image WHERE session_id = ?");
+    next.Bind(known.session_id);
+    TOUCHSTONE_RETURN_IF_ERROR(next.Step().status());
+    image.number = static_cast<uint64_t>(next.Integer(0));
+  }
+  if (image.id.empty()) image.id = absl::StrCat("image-", image.number);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckName("a picture's id", image.id));
+  {
+    SqliteStatement same = file_->Prepare("SELECT 1 FROM image WHERE session_id = ? AND id = ?");
+    same.Bind(known.session_id).Bind(image.id);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, same.Step());
+    if (found)
+      return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a picture '",
+                                                   image.id, "' already; give this one an id of its own"));
+  }
+  return InsertImage(file_.get(), known.session_id, image, tally);
 }
 
 absl::Status JournalFile::ForEachImage(const std::string& session,

@@ -113,6 +113,14 @@ struct JournalSession {
   std::string deleted_by;
 };
 
+// A session with all that it has.
+struct SessionContent {
+  JournalSession session;
+  std::vector<JournalTouch> touches;
+  std::vector<std::optional<JournalSeries>> series;  // one entry per touch, or none
+  std::vector<JournalImage> images;
+};
+
 // One connection, guarded by a mutex: all functions may be called from any thread.
 class Journal {
  public:
@@ -146,8 +154,6 @@ class Journal {
   virtual absl::Status RestoreSession(const std::string& name) = 0;
   // Ends every session of that name in the trash, for good, with its touches and images.
   virtual absl::Status PurgeSession(const std::string& name) = 0;
-  // Ends a session at once and for good: to undo an import. No touch of it may be executing.
-  virtual absl::Status EraseSession(const std::string& name) = 0;
 
   // Begins a touch: writes the intent and returns it. If the id is there with the same object and command:
   // the touch as it stands, kDone ones without change, kFailed ones as a new intent with attempt + 1. Another
@@ -169,6 +175,9 @@ class Journal {
   virtual absl::Status Failed(const std::string& session, const std::string& id,
                               const std::string& error) = 0;
 
+  // A session that was made elsewhere with all that it has, in one step, or nothing of it. Touches and pictures as
+  // AddFinished and AddImage take them. ALREADY_EXISTS if there is one of its name.
+  virtual absl::Status AddSession(const SessionContent& content) = 0;
   // Touches that were made elsewhere, kDone or kFailed, in the order of their approaches: all in one step, or
   // none. Their numbers are given anew, after those that are there. ALREADY_EXISTS names an id that is.
   // `series` has one entry per touch, or none.

@@ -43,7 +43,6 @@ class JournalFile : public Journal {
   absl::StatusOr<std::vector<JournalSession>> DeletedSessions() const override;
   absl::Status RestoreSession(const std::string& name) override;
   absl::Status PurgeSession(const std::string& name) override;
-  absl::Status EraseSession(const std::string& name) override;
   absl::StatusOr<JournalTouch> Begin(const std::string& session, const std::string& id,
                                      const std::string& object, const std::string& up_face,
                                      const std::string& command) override;
@@ -56,6 +55,7 @@ class JournalFile : public Journal {
   absl::Status Done(const std::string& session, const std::string& id, const JournalResult& result,
                     const JournalSeries* series) override;
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override;
+  absl::Status AddSession(const SessionContent& content) override;
   absl::Status AddFinished(const std::string& session, const std::vector<JournalTouch>& touches,
                            const std::vector<std::optional<JournalSeries>>& series) override;
   absl::StatusOr<std::optional<JournalTouch>> Find(const std::string& session,
@@ -105,6 +105,13 @@ class JournalFile : public Journal {
   absl::StatusOr<JournalTouch> BeginAs(const std::string& session, JournalTouch touch);
   absl::StatusOr<std::vector<JournalSession>> SessionsWhere(const char* query) const;
   absl::StatusOr<JournalSession> CheckedSession(int64_t session_id) const;
+  absl::Status CheckHead(const JournalSession& session) const;
+  // Within a transaction.
+  absl::Status AppendFinished(const std::string& session, const Known& known,
+                              const std::vector<JournalTouch>& touches,
+                              const std::vector<std::optional<JournalSeries>>& series, SessionTally* tally);
+  absl::Status AppendImage(const std::string& session, const Known& known, const JournalImage& given,
+                           SessionTally* tally);
   // journal_trash.cpp; within a transaction.
   absl::Status WantNothingExecuting(int64_t session_id, const std::string& name) const;
   absl::Status Erase(int64_t session_id);

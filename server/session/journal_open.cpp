@@ -11,6 +11,7 @@
 #include <cstring>
 #include <map>
 
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/session/journal_schema.h"
 #include "server/session/journal_seal.h"
@@ -67,6 +68,22 @@ absl::Status MakeTables(SqliteFile* file) {
   });
 }
 
+// A new journal, whole or not there: what fails halfway through would leave a file that reads as damaged.
+absl::Status MakeJournal(const std::string& path) {
+  const std::string part = UnfinishedPathOf(path);
+  const auto make = [&]() -> absl::Status {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::unique_ptr<SqliteFile> file,
+        SqliteFile::Open(path, PlainName(part), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE));
+    return MakeTables(file.get());
+  };
+  absl::Status made = make();
+  if (made.ok()) made = RenameSynced(part, path);
+  if (!made.ok())
+    for (const char* suffix : {"", "-journal"}) unlink((part + suffix).c_str());
+  return made;
+}
+
 // Whether the file is a journal of a version that can be read, which is returned; an empty one may become one.
 absl::StatusOr<int64_t> CheckIdentity(SqliteFile* file, bool may_create) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t application, file->Number("PRAGMA application_id"));
@@ -121,7 +138,16 @@ absl::Status CheckTables(SqliteFile* file, int64_t version) {
 
 absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Take(const std::string& path) {
   const std::string lock_path = path + ".lock";
-  const int descriptor = open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  // Never through a link that somebody put there: the number below is written into it.
+  const int descriptor = OpenFile(lock_path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK, 0666);
+  struct stat facts {};
+  if (descriptor < 0 ? errno == ELOOP
+                     : fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode) || facts.st_nlink > 1) {
+    if (descriptor >= 0) close(descriptor);
+    return absl::PermissionDeniedError(
+        absl::StrCat("journal ", path, " may not be written: ", lock_path,
+                     " is a link or no file of its own; remove it, or name a file in a folder of your own"));
+  }
   if (descriptor < 0)
     return absl::PermissionDeniedError(absl::StrCat(
         "journal ", path, " may not be written: ", lock_path, " cannot be made (", std::strerror(errno),
@@ -162,6 +188,7 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
     return opened;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(opened.lock, WriterLock::Take(path));
+  if (!IsThere(path)) TOUCHSTONE_RETURN_IF_ERROR(MakeJournal(path));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       opened.file,
       SqliteFile::Open(path, PlainName(path), SQLITE_OPEN_READWRITE | (may_create ? SQLITE_OPEN_CREATE : 0)));

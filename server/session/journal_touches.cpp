@@ -138,26 +138,33 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
     TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
-    TOUCHSTONE_ASSIGN_OR_RETURN(uint64_t number, NextNumber(known.session_id));
-    for (size_t k = 0; k < touches.size(); ++k) {
-      JournalTouch touch = touches[k];
-      TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", touch.id));
-      if (touch.stage != TouchStage::kDone && touch.stage != TouchStage::kFailed)
-        return Wrong(absl::StrCat("touch '", touch.id, "' is ", StageInWords(touch.stage),
-                                  "; only what has ended can be added"));
-      if (touch.stage == TouchStage::kDone)
-        TOUCHSTONE_RETURN_IF_ERROR(CheckFingers(session, touch.id, known, touch.result));
-      TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t there, FindTouch(known.session_id, touch.id));
-      if (there != 0)
-        return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a touch '",
-                                                     touch.id,
-                                                     "' already; add to a session of another name"));
-      touch.number = number++;
-      TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch,
-                                             k < series.size() && series[k] ? &*series[k] : nullptr, &tally));
-    }
+    TOUCHSTONE_RETURN_IF_ERROR(AppendFinished(session, known, touches, series, &tally));
     return WriteTally(file_.get(), known.session_id, tally);
   });
+}
+
+absl::Status JournalFile::AppendFinished(const std::string& session, const Known& known,
+                                         const std::vector<JournalTouch>& touches,
+                                         const std::vector<std::optional<JournalSeries>>& series,
+                                         SessionTally* tally) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(uint64_t number, NextNumber(known.session_id));
+  for (size_t k = 0; k < touches.size(); ++k) {
+    JournalTouch touch = touches[k];
+    TOUCHSTONE_RETURN_IF_ERROR(CheckName("a touch's id", touch.id));
+    if (touch.stage != TouchStage::kDone && touch.stage != TouchStage::kFailed)
+      return Wrong(absl::StrCat("touch '", touch.id, "' is ", StageInWords(touch.stage),
+                                "; only what has ended can be added"));
+    if (touch.stage == TouchStage::kDone)
+      TOUCHSTONE_RETURN_IF_ERROR(CheckFingers(session, touch.id, known, touch.result));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t there, FindTouch(known.session_id, touch.id));
+    if (there != 0)
+      return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a touch '",
+                                                   touch.id, "' already; add to a session of another name"));
+    touch.number = number++;
+    TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch,
+                                           k < series.size() && series[k] ? &*series[k] : nullptr, tally));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::optional<JournalTouch>> JournalFile::Find(const std::string& session,

@@ -93,15 +93,6 @@ absl::Status JournalFile::PurgeSession(const std::string& name) {
   });
 }
 
-absl::Status JournalFile::EraseSession(const std::string& name) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(name));
-  return Write([&]() -> absl::Status {
-    TOUCHSTONE_RETURN_IF_ERROR(WantNothingExecuting(known.session_id, name));
-    return Erase(known.session_id);
-  });
-}
-
 absl::Status JournalFile::Erase(int64_t session_id) {
   for (const char* sql :
        {"DELETE FROM touch_series WHERE touch_id IN (SELECT touch_id FROM touch WHERE session_id = ?)",

@@ -6,13 +6,16 @@
 #include <limits>
 #include <set>
 
+#include "server/base/file_writer.h"
 #include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
+#include "server/session/session_content_checks.h"
 #include "server/session/session_measurements.h"
 
 namespace touchstone::session {
+
 absl::Status ExportSessionCsv(const Journal& journal, const std::string& session, const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> touches,
                               SessionMeasurements(journal, session));
@@ -22,19 +25,18 @@ absl::Status ExportSessionCsv(const Journal& journal, const std::string& session
   return WriteFileAtomically(path, FormatMeasurements(touches));
 }
 
-absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& options, Journal* journal) {
+absl::StatusOr<SessionContent> ReadSessionCsv(const std::string& path, const ImportOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> measured, ParseMeasurements(text, path));
   if (measured[0].time_s.empty())
     return absl::InvalidArgumentError(absl::StrCat(
         path, ":1: has no time columns (t_l_us, ...): it is a plan; a measurement file was expected"));
-  if (journal->Session(options.session).ok())
-    return absl::AlreadyExistsError(absl::StrCat("there is a session '", options.session,
-                                                 "' already; import ", path, " under another name"));
-  std::vector<JournalTouch> touches(measured.size());
+  SessionContent content;
+  content.touches.resize(measured.size());
   for (size_t k = 0; k < measured.size(); ++k) {
-    JournalTouch& touch = touches[k];
+    JournalTouch& touch = content.touches[k];
     touch.id = std::to_string(measured[k].touch);
+    touch.number = k;
     touch.object = measured[k].object;
     touch.command = CommandBytes(measured[k].commanded);
     touch.stage = TouchStage::kDone;
@@ -49,16 +51,14 @@ absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& opti
       finger.base_from_tip.fill(kNaN);
     }
   }
-  JournalSession session;
+  JournalSession& session = content.session;
   session.name = options.session;
   session.created_unix_s = options.created_unix_s;
   session.provenance = options.provenance.empty() ? absl::StrCat("imported from ", path) : options.provenance;
   session.fingers = static_cast<int>(measured[0].time_s.size());
   session.spacing_m = options.spacing_m;
-  TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
-  const absl::Status added = journal->AddFinished(options.session, touches);
-  if (!added.ok()) (void)journal->EraseSession(options.session);
-  return added;
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSessionContent(content, path));
+  return content;
 }
 
 }  // namespace touchstone::session

@@ -22,16 +22,17 @@ absl::Status ExportSessionCsv(const Journal& journal, const std::string& session
 absl::Status ExportSessionHdf5(const Journal& journal, const std::string& session, const std::string& path);
 
 struct ImportOptions {
-  std::string session;      // its name; must be new
+  std::string session;      // its name; empty: that of an HDF5 file
   double spacing_m = 0.03;  // of the fingers; a measurement file does not say
   std::string provenance;   // where the touches were made; default: "imported from FILE"
   double created_unix_s = 0;
 };
 
-// A measurement file with poses as a session: all of it or nothing. The ids are the file's touch numbers.
-absl::Status ImportSessionCsv(const std::string& path, const ImportOptions& options, Journal* journal);
-// What ExportSessionHdf5 wrote, as the session that it was; under another name if options.session is not
+// Files as what Journal::AddSession takes, checked alike (session_content_checks.h): a measurement file with poses, whose
+// touch numbers are the ids, ...
+absl::StatusOr<SessionContent> ReadSessionCsv(const std::string& path, const ImportOptions& options);
+// ... and what ExportSessionHdf5 wrote, as the session that it was; under another name if options.session is not
 // empty.
-absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& options, Journal* journal);
+absl::StatusOr<SessionContent> ReadSessionHdf5(const std::string& path, const ImportOptions& options);
 
 }  // namespace touchstone::session

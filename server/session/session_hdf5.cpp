@@ -1,11 +1,15 @@
 // A session as HDF5, in SI so that every number comes back bit for bit.
 #include <absl/strings/str_cat.h>
 
+#include <array>
 #include <limits>
+#include <optional>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/session/command_bytes.h"
 #include "server/session/hdf5_file.h"
+#include "server/session/session_content_checks.h"
 #include "server/session/session_files.h"
 #include "server/session/session_hdf5_images.h"
 #include "server/session/touch_series.h"
@@ -21,12 +25,39 @@ void Append(const v1::Vector3& v, std::vector<double>* values) {
   values->insert(values->end(), {v.x(), v.y(), v.z()});
 }
 
+// Commands as numbers that others read.
+struct Commanded {
+  std::vector<double> target, approach, lateral, standoff, speed;
+
+  void Append(const JournalTouch& touch) {
+    const v1::CommandedTouch command = ParseCommandBytes(touch.command).value_or(v1::CommandedTouch());
+    session::Append(command.target_m(), &target);
+    session::Append(command.approach(), &approach);
+    session::Append(command.lateral(), &lateral);
+    standoff.push_back(command.standoff_m());
+    speed.push_back(command.speed_m_s());
+  }
+  struct Column {
+    const char *name, *unit;
+    const std::vector<double>* values;
+    hsize_t per_row;
+  };
+  std::array<Column, 5> Columns() const {
+    return {{{"target_m", "m", &target, 3},
+             {"approach", "", &approach, 3},
+             {"lateral", "", &lateral, 3},
+             {"standoff_m", "m", &standoff, 1},
+             {"commanded_speed_m_s", "m/s", &speed, 1}}};
+  }
+};
+
 void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf5Columns* columns) {
   const hsize_t rows = touches.size();
   std::vector<std::string> ids, objects, up_faces, commands;
   std::vector<uint64_t> attempt, round, face, recovered, ticks;
-  std::vector<double> target, approach, lateral, standoff, commanded_speed, speed, session_time, start,
-      time_uncertainty, synchronisation, drift, time, position, rotation;
+  Commanded commanded;
+  std::vector<double> speed, session_time, start, time_uncertainty, synchronisation, drift, time, position,
+      rotation;
   for (const JournalTouch& touch : touches) {
     ids.push_back(touch.id);
     objects.push_back(touch.object);
@@ -35,12 +66,7 @@ void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf
     attempt.push_back(static_cast<uint64_t>(touch.attempt));
     round.push_back(touch.round ? static_cast<uint64_t>(*touch.round) : kNoNumber);
     face.push_back(touch.face ? static_cast<uint64_t>(*touch.face) : kNoNumber);
-    const v1::CommandedTouch command = ParseCommandBytes(touch.command).value_or(v1::CommandedTouch());
-    Append(command.target_m(), &target);
-    Append(command.approach(), &approach);
-    Append(command.lateral(), &lateral);
-    standoff.push_back(command.standoff_m());
-    commanded_speed.push_back(command.speed_m_s());
+    commanded.Append(touch);
     const JournalResult& result = touch.result;
     speed.push_back(result.speed_m_s);
     session_time.push_back(result.session_time_s);
@@ -59,11 +85,8 @@ void WriteTouches(const std::vector<JournalTouch>& touches, hsize_t fingers, Hdf
   columns->Texts("id", ids);
   columns->Texts("object", objects);
   columns->Texts("placement", up_faces);
-  columns->Numbers("target_m", "m", target, {rows, 3});
-  columns->Numbers("approach", "", approach, {rows, 3});
-  columns->Numbers("lateral", "", lateral, {rows, 3});
-  columns->Numbers("standoff_m", "m", standoff, {rows});
-  columns->Numbers("commanded_speed_m_s", "m/s", commanded_speed, {rows});
+  for (const auto& [name, unit, values, per_row] : commanded.Columns())
+    columns->Numbers(name, unit, *values, per_row == 1 ? std::vector{rows} : std::vector{rows, per_row});
   columns->Numbers("contact_time_s", "s", time, {rows, fingers});
   columns->Numbers("base_from_tip_position_m", "m", position, {rows, fingers, 3});
   columns->Numbers("base_from_tip_rotation_rad", "rad", rotation, {rows, fingers, 3});
@@ -142,8 +165,36 @@ absl::StatusOr<std::vector<std::optional<JournalSeries>>> ReadSeriesOf(const Hdf
   return all;
 }
 
-absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t fingers,
-                         std::vector<JournalTouch>* touches) {
+// A number that is unknown where it is kNoNumber.
+absl::Status ReadNumber(const std::string& path, const char* name, uint64_t row, uint64_t value,
+                        std::optional<int>* number) {
+  if (value == kNoNumber) return absl::OkStatus();
+  if (value > static_cast<uint64_t>(std::numeric_limits<int>::max()))
+    return absl::InvalidArgumentError(absl::StrCat(path, ": touch ", row, ": ", name, " (", value,
+                                                   ") is out of range; 0 to ",
+                                                   std::numeric_limits<int>::max(), " was expected"));
+  *number = static_cast<int>(value);
+  return absl::OkStatus();
+}
+
+// What is also written as numbers for others to read says what the command says.
+absl::Status CheckCommands(const Hdf5ColumnsReader& file, const std::string& path,
+                           const std::vector<JournalTouch>& touches) {
+  Commanded commanded;
+  for (const JournalTouch& touch : touches) commanded.Append(touch);
+  for (const auto& [name, unit, values, per_row] : commanded.Columns()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto there, file.Numbers(name, values->size()));
+    for (size_t k = 0; k < there.size(); ++k)
+      if (there[k] != (*values)[k])
+        return absl::InvalidArgumentError(absl::StrCat(path, ": touch ", k / per_row, ": dataset ", name,
+                                                       " has ", ShortestNumber(there[k]), ", its command ",
+                                                       ShortestNumber((*values)[k])));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReadTouches(const Hdf5ColumnsReader& file, const std::string& path, uint64_t rows,
+                         uint64_t fingers, std::vector<JournalTouch>* touches) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto ids, file.Texts("id", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto objects, file.Texts("object", rows));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto up_faces, file.Texts("placement", rows));
@@ -169,13 +220,19 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
   for (uint64_t k = 0; k < rows; ++k) {
     JournalTouch& touch = (*touches)[k];
     touch.id = ids[k];
+    touch.number = k;
     touch.object = objects[k];
     touch.up_face = up_faces[k];
     touch.command = commands[k];
     touch.stage = TouchStage::kDone;
-    touch.attempt = static_cast<int>(attempt[k]);
-    if (round[k] != kNoNumber) touch.round = static_cast<int>(round[k]);
-    if (face[k] != kNoNumber) touch.face = static_cast<int>(face[k]);
+    std::optional<int> number;
+    TOUCHSTONE_RETURN_IF_ERROR(ReadNumber(path, "attempt", k, attempt[k], &number));
+    touch.attempt = number.value_or(0);
+    TOUCHSTONE_RETURN_IF_ERROR(ReadNumber(path, "round", k, round[k], &touch.round));
+    TOUCHSTONE_RETURN_IF_ERROR(ReadNumber(path, "face", k, face[k], &touch.face));
+    if (recovered[k] > 1)
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, ": touch ", k, ": recovered (", recovered[k], ") is neither 0 nor 1"));
     touch.result.recovered = recovered[k] != 0;
     touch.result.speed_m_s = speed[k];
     touch.result.session_time_s = session_time[k];
@@ -193,7 +250,7 @@ absl::Status ReadTouches(const Hdf5ColumnsReader& file, uint64_t rows, uint64_t 
       finger.ticks = ticks[i];
     }
   }
-  return absl::OkStatus();
+  return CheckCommands(file, path, *touches);
 }
 
 }  // namespace
@@ -229,13 +286,14 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, 
   return columns.Finish();
 }
 
-absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& options, Journal* journal) {
+absl::StatusOr<SessionContent> ReadSessionHdf5(const std::string& path, const ImportOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Hdf5ColumnsReader file, Hdf5ColumnsReader::Open(path));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto format, file.Texts("session/format", 1));
   if (format[0] != kFormat)
     return absl::InvalidArgumentError(
         absl::StrCat(path, ": is of format '", format[0], "'; this program reads '", kFormat, "'"));
-  JournalSession session;
+  SessionContent content;
+  JournalSession& session = content.session;
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto name, file.Texts("session/name", 1));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto source, file.Texts("session/source", 1));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto calibration, file.Texts("session/calibration", 1));
@@ -251,19 +309,11 @@ absl::Status ImportSessionHdf5(const std::string& path, const ImportOptions& opt
     if (count > kMaxRows)
       return absl::InvalidArgumentError(absl::StrCat(path, ": ", count, " rows cannot be read"));
   session.fingers = static_cast<int>(counts[0]);
-  std::vector<JournalTouch> touches;
-  std::vector<JournalImage> images;
-  TOUCHSTONE_RETURN_IF_ERROR(ReadTouches(file, counts[1], counts[0], &touches));
-  TOUCHSTONE_RETURN_IF_ERROR(ReadHdf5Images(file, counts[2], &images));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto series, ReadSeriesOf(file, counts[1]));
-  if (journal->Session(session.name).ok())
-    return absl::AlreadyExistsError(absl::StrCat("there is a session '", session.name, "' already; import ",
-                                                 path, " under another name"));
-  TOUCHSTONE_RETURN_IF_ERROR(journal->EnsureSession(session));
-  absl::Status added = journal->AddFinished(session.name, touches, series);
-  for (size_t k = 0; k < images.size() && added.ok(); ++k) added = journal->AddImage(session.name, images[k]);
-  if (!added.ok()) (void)journal->EraseSession(session.name);
-  return added;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadTouches(file, path, counts[1], counts[0], &content.touches));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadHdf5Images(file, counts[2], &content.images));
+  TOUCHSTONE_ASSIGN_OR_RETURN(content.series, ReadSeriesOf(file, counts[1]));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSessionContent(content, path));
+  return content;
 }
 
 }  // namespace touchstone::session

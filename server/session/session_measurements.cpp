@@ -20,19 +20,15 @@ Eigen::Vector3d VectorOf(const v1::Vector3& v) {
 
 }  // namespace
 
-absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
-                                                               const std::string& session) {
+absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done,
+                                                             const std::string& where) {
   std::vector<MeasuredTouch> touches;
   std::vector<uint64_t> ids;
-  absl::Status status;
-  TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session, [&](const JournalTouch& touch) {
-    if (touch.stage != TouchStage::kDone) return true;
+  for (const JournalTouch& touch : done) {
     const auto command = ParseCommandBytes(touch.command);
-    if (!command) {
-      status = absl::DataLossError(absl::StrCat("session '", session, "': the command of touch '", touch.id,
-                                                "' cannot be read; it is damaged"));
-      return false;
-    }
+    if (!command)
+      return absl::DataLossError(
+          absl::StrCat(where, ": the command of touch '", touch.id, "' cannot be read; it is damaged"));
     MeasuredTouch& measured = touches.emplace_back();
     measured.touch = touch.number;
     measured.object = touch.object;
@@ -46,12 +42,20 @@ absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& jo
     uint64_t id = 0;
     if (absl::SimpleAtoi(touch.id, &id) && std::to_string(id) == touch.id && id <= 1ull << 53)
       ids.push_back(id);
-    return true;
-  }));
-  TOUCHSTONE_RETURN_IF_ERROR(status);
+  }
   if (ids.size() == touches.size())
     for (size_t i = 0; i < ids.size(); ++i) touches[i].touch = ids[i];
   return touches;
+}
+
+absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
+                                                               const std::string& session) {
+  std::vector<JournalTouch> done;
+  TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session, [&](const JournalTouch& touch) {
+    if (touch.stage == TouchStage::kDone) done.push_back(touch);
+    return true;
+  }));
+  return MeasuredTouchesOf(done, absl::StrCat("session '", session, "'"));
 }
 
 absl::StatusOr<MeasurementSet> MakeMeasurementSet(const std::vector<MeasuredTouch>& touches,

@@ -54,6 +54,8 @@ absl::StatusOr<bool> SqliteStatement::Step() {
   if (result == SQLITE_ROW) return true;
   if (result == SQLITE_DONE) return false;
   result_ = result;
+  // Nothing writes such a row: it is damaged.
+  if (result == SQLITE_TOOBIG) return absl::DataLossError(file_->Error(result).message());
   return file_->Error(result);
 }
 
@@ -113,6 +115,8 @@ absl::StatusOr<std::unique_ptr<SqliteFile>> SqliteFile::Open(const std::string& 
   if (result != SQLITE_OK) return file->Error(result);
   sqlite3_extended_result_codes(database, 1);
   sqlite3_busy_timeout(database, 5000);
+  // Before there is memory for it.
+  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
   return file;
 }
 
@@ -177,7 +181,11 @@ absl::Status SqliteFile::Error(int result) const {
           message("cannot be opened",
                   "check that the folder is there and that file and folder may be read and written"));
     case SQLITE_TOOBIG:
-      return absl::InvalidArgumentError(message("cannot hold so large a value", "make it smaller"));
+      return absl::InvalidArgumentError(message(
+          absl::StrCat("holds values of at most ", kMaxValueBytes >> 20, " MiB"), "make this one smaller"));
+    case SQLITE_NOMEM:
+      return absl::ResourceExhaustedError(
+          message("needs more memory than there is", "give this program more, or wait"));
     default:
       return absl::InternalError(message("failed", "this is a mistake of this program"));
   }

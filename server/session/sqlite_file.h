@@ -22,6 +22,9 @@ inline constexpr char kRescueTheFile[] =
     "rest.h5; a "
     "sqlite3 of sqlite.org also has: sqlite3 FILE .recover | sqlite3 NEW";
 
+// Of a value or a row of a journal, written or read: a picture has at most 32 MiB.
+inline constexpr int kMaxValueBytes = 64 << 20;
+
 class SqliteFile;
 
 // A statement in use: bind what its question marks stand for, in their order, then step or run. Given back

@@ -112,10 +112,12 @@ class Server(Program):
     """A touchstone-server, or with `gateway` a touchstone-gateway, on a free port of this machine."""
 
     def __init__(self, *options: str, gateway: bool = False, max_files: int | None = None, environment: dict[str, str] | None = None,
-                 listen: str = "127.0.0.1:0"):
-        """max_files: soft and hard limit of open files; None: as this process has it."""
+                 listen: str = "127.0.0.1:0", memory_mib: int | None = None):
+        """max_files: soft and hard limit of open files; memory_mib: of its address space; None: as this process has it."""
         # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
         limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
+        if memory_mib is not None:
+            limited += ("prlimit", f"--as={memory_mib << 20}")
         super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", listen, *SMALL, *options],
                          r"listening on (127\.0\.0\.1:\d+)", environment)
 

@@ -5,12 +5,14 @@ import pytest
 
 import clock_jumps
 import disk_full
+import failing_files
 import failover
 import flat_memory
 import floods
 import hostile_bytes
 import kill_gateway
 import kill_while_writing
+import little_memory
 import lost_device
 import many_clients
 import own_cgroup
@@ -51,6 +53,19 @@ def test_a_server_lives_within_the_memory_limit_of_its_own_cgroup(limit_mib, str
         passes(own_cgroup.run(limit_mib, streams))
     except PermissionError as error:
         pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("name", ["export .h5", "import .csv", pytest.param("", marks=pytest.mark.second_tier(
+    "repeated: every other command that writes"), id="all")])
+def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
+    # For one command, those of the faults that differ in what the program can still do; the tests in C++ have all of them.
+    faults = [fault for fault in failing_files.FAULTS if not name or fault.name in ("full from then on", "killed")]
+    passes(failing_files.run((name,) if name else (), faults))
+
+
+@pytest.mark.second_tier("repeated: the same commands with less memory each time")
+def test_a_program_without_memory_says_so_and_leaves_whole_files_or_none():
+    passes(little_memory.run())
 
 
 HOSTILE_PARTS = 4

@@ -8,6 +8,7 @@
 #include <absl/strings/str_format.h>
 #include <nlohmann/json.hpp>
 
+#include "server/base/file_writer.h"
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
 

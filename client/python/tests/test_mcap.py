@@ -167,3 +167,54 @@ def test_a_file_that_exists_is_kept_without_force(tmp_path, capsys):
     assert touchstone_mcap.main([*arguments, "--force"]) == 0
     assert len(_messages(tmp_path / "a.mcap")["/touch"]) == 2
     assert touchstone.__version__
+
+
+def _from_elsewhere(path, name, make):
+    with h5py.File(path, "r+") as file:
+        del file[name]
+        make(file)
+
+
+@pytest.mark.parametrize("make", [
+    lambda file, other: file.__setitem__("contact_time_s", h5py.ExternalLink(str(other), "contact_time_s")),
+    lambda file, other: file.__setitem__("contact_time_s", h5py.SoftLink("/start_unix_s")),
+    lambda file, other: file.create_dataset("contact_time_s", (2, 3), "f8", external=[(str(other), 0, 48)]),
+    lambda file, other: file.create_virtual_dataset("contact_time_s", _layout_of(other)),
+], ids=["external link", "soft link", "external storage", "virtual"])
+def test_nothing_is_read_from_another_file(tmp_path, make):
+    session, other = tmp_path / "session.h5", tmp_path / "other.h5"
+    _write_session(session)
+    _write_session(other)
+    _from_elsewhere(session, "contact_time_s", lambda file: make(file, other))
+    with pytest.raises(touchstone_mcap.ExportError, match="contact_time_s is a link, or has its values in another place"):
+        touchstone_mcap.export(session, tmp_path / "session.mcap")
+    assert not (tmp_path / "session.mcap").exists()
+
+
+def _layout_of(path):
+    layout = h5py.VirtualLayout((2, 3), "f8")
+    layout[...] = h5py.VirtualSource(str(path), "contact_time_s", (2, 3))
+    return layout
+
+
+def test_a_value_that_was_changed_is_named(tmp_path):
+    import hashlib
+
+    session = tmp_path / "session.h5"
+    _write_session(session)
+    with h5py.File(session, "r+") as file:
+        sums = {}
+
+        def seal(name, entry):
+            if isinstance(entry, h5py.Dataset):
+                sums[name] = hashlib.sha256(entry[...].tobytes()).hexdigest()
+                entry.attrs["sha256"] = np.bytes_(sums[name])
+
+        file.visititems(seal)
+        lines = "".join(f"{name} {digest}\n" for name, digest in sorted(sums.items()))
+        file.attrs["checksums"] = np.bytes_(hashlib.sha256(lines.encode()).hexdigest())
+    assert touchstone_mcap.export(session, tmp_path / "session.mcap")
+    with h5py.File(session, "r+") as file:
+        file["start_unix_s"][0] += 1
+    with pytest.raises(touchstone_mcap.ExportError, match="start_unix_s is damaged or was changed"):
+        touchstone_mcap.export(session, tmp_path / "again.mcap")

@@ -18,15 +18,16 @@ from __future__ import annotations
 
 import argparse
 import base64
+import hashlib
 import json
 import math
 import os
-import pathlib
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 from .v1 import types_pb2
+from .whole_file import whole_file
 
 _SECOND_NS = 1_000_000_000
 
@@ -108,6 +109,25 @@ def _byte_strings(group: Any, name: str) -> list[bytes]:
     return [data[begin:end] for begin, end in zip(offsets, offsets[1:])]
 
 
+def _check(path: str | os.PathLike[str], group: Any, checksums: bool, sums: dict[str, str]) -> None:
+    """Everything lies in this file, and is what was written: no links, nothing from other files, sums as they should be; `sums` gets
+    each dataset's."""
+    import h5py
+
+    for name in group:
+        entry = group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
+        where = f"{path}: {group.name.rstrip('/')}/{name}"
+        if isinstance(entry, h5py.Group) and group.name == "/":
+            _check(path, entry, checksums, sums)
+        elif not isinstance(entry, h5py.Dataset) or entry.is_virtual or entry.external:
+            raise ExportError(f"{where} is a link, or has its values in another place; export the session again.")
+        elif checksums and "sha256" in entry.attrs:
+            sums[entry.name.lstrip("/")] = digest = entry.attrs["sha256"].decode()
+            if hashlib.sha256(entry[...].tobytes()).hexdigest() == digest:
+                continue
+            raise ExportError(f"{where} is damaged or was changed: its values are not those of its checksum; export the session again.")
+
+
 class SessionFile:
     """An HDF5 file of `touchstone session export`, opened for reading; `with` closes it."""
 
@@ -122,6 +142,11 @@ class SessionFile:
         found = _texts(self._file["session/format"])[0] if "session/format" in self._file else "none"
         if found != "touchstone: session/1":
             raise ExportError(f"{path}: its format is {found!r}, and 'touchstone: session/1' was expected.")
+        sums: dict[str, str] = {}
+        _check(path, self._file, "checksums" in self._file.attrs, sums)
+        lines = "".join(f"{name} {digest}\n" for name, digest in sorted(sums.items()))
+        if "checksums" in self._file.attrs and hashlib.sha256(lines.encode()).hexdigest() != self._file.attrs["checksums"].decode():
+            raise ExportError(f"{path} is damaged or was changed: its datasets are not those that were written; export the session again.")
         self.name = _texts(self._file["session/name"])[0]
         self.provenance = _texts(self._file["session/source"])[0]
         self.calibration = _texts(self._file["session/calibration"])[0]
@@ -202,17 +227,8 @@ def export(session: str | os.PathLike[str], output: str | os.PathLike[str]) -> d
         from mcap.writer import Writer
     except ImportError as error:
         raise ExportError(f"{error}; install them with: pip install 'touchstone[mcap]'") from None
-    part = pathlib.Path(f"{os.fspath(output)}.part")
-    try:
-        with SessionFile(session) as source, open(part, "wb") as stream:
-            counts = _write(source, Writer(stream))
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(part, output)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    return counts
+    with SessionFile(session) as source, whole_file(output, "wb") as stream:
+        return _write(source, Writer(stream))
 
 
 def _write(source: SessionFile, writer: Any) -> dict[str, int]:

@@ -14,6 +14,7 @@ import numpy as np
 from .batch import Batch
 from .errors import InvalidRequest
 from .plans import Touches, touches as make_touches
+from .whole_file import whole_file
 
 _VECTORS = {"target_mm": ("target_x_mm", "target_y_mm", "target_z_mm"),
             "approach": ("approach_x", "approach_y", "approach_z"),
@@ -96,15 +97,11 @@ def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row]) -> Non
         if len(row.time_us) != fingers:
             raise InvalidRequest(f"Touch {row.touch} has {len(row.time_us)} times, but the first one has {fingers}.")
 
-    part = os.fspath(path) + ".part"
-    with open(part, "w", newline="", encoding="utf-8") as file:
+    with whole_file(path, newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_HEAD, *(f"t_{name}_us" for name in names), *(["session_time_s"] if has_time else []),
                          *covariates])
         writer.writerows(_cells(row, has_time, covariates) for row in rows)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
 
 
 def _cells(row: Row, has_time: bool, covariates: Sequence[str]) -> Iterator[str]:

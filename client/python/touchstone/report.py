@@ -15,6 +15,7 @@ from .errors import InvalidRequest
 from .measurements import Row
 from .plans import Touches
 from .v1 import diagnosis_pb2
+from .whole_file import whole_file
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,7 +171,5 @@ def _value(p: diagnosis_pb2.ParameterValue) -> Value:
 
 
 def _write(path: str | os.PathLike[str], text: str) -> None:
-    part = os.fspath(path) + ".part"
-    with open(part, "w", encoding="utf-8") as file:
+    with whole_file(path, encoding="utf-8") as file:
         file.write(text)
-    os.replace(part, path)

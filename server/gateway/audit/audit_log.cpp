@@ -12,12 +12,14 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "server/base/file_writer.h"
+#include "server/base/printable.h"
 #include "server/base/status.h"
 
 namespace touchstone::gateway::audit {
 namespace {
 
-absl::Status FileError(const std::string& path, const std::string& what, const std::string& remedy) {
+absl::Status AuditError(const std::string& path, const std::string& what, const std::string& remedy) {
   const int error = errno;
   const std::string message =
       absl::StrCat("audit log ", path, ": ", what, " (", std::strerror(error), "); ", remedy);
@@ -47,7 +49,7 @@ std::string Line(const std::string& event, const std::vector<std::pair<std::stri
   for (const auto& [name, value] : fields) line[name] = value;
   if (!lease_holder.empty() && !line.contains("holder")) line["lease_holder"] = lease_holder;
   // Bytes that are no UTF-8 must not lose the line.
-  return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return EscapeInJson(line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)) + "\n";
 }
 
 class NoAuditLog : public AuditLog {
@@ -75,31 +77,28 @@ class FileAuditLog : public AuditLog {
     std::string line = Line(event, fields, lease_holder_ ? lease_holder_() : "");
     if (cut_line_) line.insert(line.begin(), '\n');
     size_t written = 0;
-    while (written < line.size()) {
-      const ssize_t count = write(descriptor_, line.data() + written, line.size() - written);
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) {
-        cut_line_ = cut_line_ || written > 0;
-        return FileError(path_, "cannot be written", "make room on its disk");
-      }
-      written += static_cast<size_t>(count);
+    if (const absl::Status failed = WriteAll(descriptor_, path_, line, &written); !failed.ok()) {
+      cut_line_ = cut_line_ || written > 0;
+      return absl::Status(absl::IsResourceExhausted(failed) ? failed.code() : absl::StatusCode::kUnavailable,
+                          absl::StrCat("audit log ", failed.message(), "; make room on its disk"));
     }
     cut_line_ = false;
-    if (fdatasync(descriptor_) != 0) return FileError(path_, "cannot be synced", "check its disk");
-    return absl::OkStatus();
+    const absl::Status synced = SyncDescriptor(descriptor_, path_);
+    if (synced.ok()) return synced;
+    return absl::UnavailableError(absl::StrCat("audit log ", synced.message(), "; check its disk"));
   }
 
   // A power cut or a full disk may have left a line without its end: the next one must not be glued to it.
   absl::Status CheckLastLine() {
     struct stat facts {};
-    if (fstat(descriptor_, &facts) != 0) return FileError(path_, "cannot be examined", "check its disk");
+    if (fstat(descriptor_, &facts) != 0) return AuditError(path_, "cannot be examined", "check its disk");
     if (!S_ISREG(facts.st_mode))
       return absl::InvalidArgumentError(
           absl::StrCat("audit log ", path_, ": is no regular file; name a file to append to"));
     if (facts.st_size == 0) return absl::OkStatus();
     char last = 0;
     if (pread(descriptor_, &last, 1, facts.st_size - 1) != 1)
-      return FileError(path_, "cannot be read", "check its disk");
+      return AuditError(path_, "cannot be read", "check its disk");
     cut_line_ = last != '\n';
     return absl::OkStatus();
   }
@@ -112,26 +111,13 @@ class FileAuditLog : public AuditLog {
   bool cut_line_ = false;
 };
 
-// The name of a new file is on the disk only when its folder is.
-absl::Status SyncFolderOf(const std::string& path) {
-  const size_t slash = path.rfind('/');
-  const std::string folder = slash == std::string::npos ? "." : slash == 0 ? "/" : path.substr(0, slash);
-  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return FileError(folder, "cannot be opened", "its folder must be readable");
-  const bool synced = fsync(descriptor) == 0;
-  const absl::Status status =
-      synced ? absl::OkStatus() : FileError(folder, "cannot be synced", "check its disk");
-  close(descriptor);
-  return status;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<AuditLog>> AuditLog::Open(const std::string& path) {
   if (path.empty()) return std::unique_ptr<AuditLog>(new NoAuditLog);
-  const int descriptor = open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
+  const int descriptor = OpenFile(path, O_RDWR | O_APPEND | O_CREAT, 0640);
   if (descriptor < 0)
-    return FileError(path, "cannot be opened", "name a file in a folder that exists and may be written");
+    return AuditError(path, "cannot be opened", "name a file in a folder that exists and may be written");
   auto log = std::make_unique<FileAuditLog>(path, descriptor);
   TOUCHSTONE_RETURN_IF_ERROR(log->CheckLastLine());
   TOUCHSTONE_RETURN_IF_ERROR(SyncFolderOf(path));

@@ -49,6 +49,14 @@ TEST_F(AuditLogTest, EveryEventIsOneJsonObjectALine) {
   EXPECT_THAT(lines[0], HasSubstr("{\"time\":"));
 }
 
+TEST_F(AuditLogTest, NoLineHasCharactersThatCannotBeSeen) {
+  auto log = AuditLog::Open(path_);
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_TRUE((*log)->Write("stop", {{"why", "left \u202ethgir J\u00fcrgen"}}).ok());
+  EXPECT_THAT(Lines()[0], HasSubstr("left \\u202ethgir J\u00fcrgen"));
+  EXPECT_EQ(nlohmann::json::parse(Lines()[0])["why"], "left \u202ethgir J\u00fcrgen");
+}
+
 TEST_F(AuditLogTest, LinesNameWhoHoldsTheLeaseUnlessTheyNameAHolder) {
   auto log = AuditLog::Open(path_);
   ASSERT_TRUE(log.ok()) << log.status();

@@ -137,7 +137,6 @@ class StampedJournal : public session::Journal {
   }
   absl::Status RestoreSession(const std::string& name) override { return journal_->RestoreSession(name); }
   absl::Status PurgeSession(const std::string& name) override { return journal_->PurgeSession(name); }
-  absl::Status EraseSession(const std::string& name) override { return journal_->EraseSession(name); }
   absl::StatusOr<session::JournalTouch> Begin(const std::string& session, const std::string& id,
                                               const std::string& object, const std::string& up_face,
                                               const std::string& command) override {
@@ -163,6 +162,9 @@ class StampedJournal : public session::Journal {
   }
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error) override {
     return journal_->Failed(session, id, error);
+  }
+  absl::Status AddSession(const session::SessionContent& content) override {
+    return journal_->AddSession(content);
   }
   absl::Status AddFinished(const std::string& session, const std::vector<session::JournalTouch>& touches,
                            const std::vector<std::optional<session::JournalSeries>>& series) override {

@@ -1,0 +1,59 @@
+"""What this package writes is whole or as it was."""
+
+import os
+import resource
+import signal
+
+import pytest
+
+from touchstone.whole_file import whole_file
+
+
+@pytest.fixture
+def full_disk():
+    """No file of this process can grow, as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path, full_disk):
+    path = tmp_path / "set.csv"
+    path.touch()
+    with pytest.raises(OSError, match="File too large"), whole_file(path) as file:
+        file.write("longer than a byte")
+    assert not path.read_bytes() and os.listdir(tmp_path) == ["set.csv"]
+
+
+def test_an_error_of_the_writer_leaves_nothing(tmp_path):
+    def write_half():
+        with whole_file(tmp_path / "set.csv") as file:
+            file.write("half")
+            raise ValueError("why")
+
+    with pytest.raises(ValueError, match="why"):
+        write_half()
+    assert not os.listdir(tmp_path)
+
+
+def test_nothing_is_written_through_a_link_that_can_be_foreseen(tmp_path):
+    (tmp_path / "of another").write_text("kept")
+    (tmp_path / "set.csv.part").symlink_to(tmp_path / "of another")
+    with whole_file(tmp_path / "set.csv") as file:
+        file.write("new")
+    assert (tmp_path / "of another").read_text() == "kept" and (tmp_path / "set.csv").read_text() == "new"
+
+
+def test_permission_bits_are_those_of_open_or_of_the_file_before(tmp_path):
+    path = tmp_path / "set.csv"
+    with whole_file(path, "wb") as file:
+        file.write(b"new")
+    (tmp_path / "opened").write_text("")
+    assert path.stat().st_mode == (tmp_path / "opened").stat().st_mode
+    path.chmod(0o640)
+    with whole_file(path) as file:
+        file.write("again")
+    assert path.stat().st_mode & 0o777 == 0o640
