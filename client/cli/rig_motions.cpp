@@ -37,13 +37,15 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
   if (cli.output().json)
     PrintJson({{"aborted_touches", response.aborted_touches()}, {"standstill", response.standstill()}});
   if (!response.standstill())
-    return absl::UnavailableError(absl::StrCat(
-        "THE STOP WAS SENT, BUT NOT CONFIRMED: ",
-        response.not_confirmed().empty() ? "the gateway does not say whether the arm stands still; press the emergency "
-                                           "stop if anything moves"
-                                         : response.not_confirmed(),
-        ". It holds until somebody releases it: touchstone rig reset --reason TEXT"));
-  cli.Log(absl::StrCat("stopped, and nothing moves; ", Counted(response.aborted_touches(), "touch was", "touches were"),
+    return absl::UnavailableError(
+        absl::StrCat("THE STOP WAS SENT, BUT NOT CONFIRMED: ",
+                     response.not_confirmed().empty()
+                         ? "the gateway does not say whether the arm stands still; press the emergency "
+                           "stop if anything moves"
+                         : response.not_confirmed(),
+                     ". It holds until somebody releases it: touchstone rig reset --reason TEXT"));
+  cli.Log(absl::StrCat("stopped, and nothing moves; ",
+                       Counted(response.aborted_touches(), "touch was", "touches were"),
                        " under way. This is a software stop and not safety-rated. It holds until somebody "
                        "releases it: touchstone "
                        "rig reset --reason TEXT"));

@@ -56,7 +56,9 @@ class Latch : public Safety {
                                          {"home", rig_->Home(&homing, home, &rig)},
                                          {"mount", rig_->MountObject(&mounting, mount, &rig)}}) {
         EXPECT_THAT(status.error_code(), testing::AnyOf(grpc::ABORTED, grpc::FAILED_PRECONDITION)) << what;
-        EXPECT_THAT(status.error_message(), testing::AllOf(testing::HasSubstr(because), testing::HasSubstr("rig reset"))) << what;
+        EXPECT_THAT(status.error_message(),
+                    testing::AllOf(testing::HasSubstr(because), testing::HasSubstr("rig reset")))
+            << what;
       }
     }
     EXPECT_THAT(CommandsSince(commands), testing::Each("program stop_motion"))

@@ -58,7 +58,7 @@ class PhysicalTest : public testing::Test {
   void StopGateway();
   void StartGatewayProcess();
   void KillGatewayProcess();
-  void AwaitGatewayProcess();  // it was told to end
+  void AwaitGatewayProcess();                         // it was told to end
   pid_t gateway_process() const { return process_; }  // 0: none
 
   // A touch of lat00 from above, 10 mm to the side for every unit of `which`.

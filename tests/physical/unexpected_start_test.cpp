@@ -178,9 +178,9 @@ TEST_F(UnexpectedStart, ANetworkThatWasGoneLatchesIfItEndedAMotionHoweverLongItW
   StartRig();
   StartGateway();
   int ended = 0, lasted = 0;
-  const std::vector<double> cuts_s = SecondTierRuns()
-                                         ? std::vector<double>{0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.6, 2, 3, 5}
-                                         : std::vector<double>{0.05, 1.2, 2};
+  const std::vector<double> cuts_s =
+      SecondTierRuns() ? std::vector<double>{0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.6, 2, 3, 5}
+                       : std::vector<double>{0.05, 1.2, 2};
   for (size_t k = 0; k < cuts_s.size(); ++k) {
     const std::string id = "cut " + std::to_string(cuts_s[k]);
     Answer answer;
@@ -234,8 +234,9 @@ TEST_F(UnexpectedStart, AGatewayThatIsToldToEndDuringAMotionLeavesALatch) {
 TEST_F(UnexpectedStart, AForeignProgramIsStoppedDuringAMotionAndLatchesAtAnyTime) {
   StartRig();
   StartGateway();
-  const std::string endless = "def swing():\n  while True:\n    movej([0.2,-1.6,-1.6,-1.6,1.5,0], a=0.1, v=0.05)\n"
-                              "    movej([0,-1.5,-1.5,-1.5,1.5,0], a=0.1, v=0.05)\n  end\nend\n";
+  const std::string endless =
+      "def swing():\n  while True:\n    movej([0.2,-1.6,-1.6,-1.6,1.5,0], a=0.1, v=0.05)\n"
+      "    movej([0,-1.5,-1.5,-1.5,1.5,0], a=0.1, v=0.05)\n  end\nend\n";
   {
     KeptLease lease(control_.get(), "client", true);
     auto touch = TouchLater(lease.token(), FromAbove(kSlow), "replaced");

@@ -76,7 +76,8 @@ int main(int argc, char** argv) {
                  "Folder for gateway.toml, calibration.yaml, emulator.json, the log and the port");
   app.add_option("--arm", options.arm, "Arm to emulate")->check(CLI::IsMember({"ur3", "ur3e"}));
   app.add_flag("--powered,!--power-off", options.powered,
-               "Whether the arm's power is on and its brakes are released at the beginning, as a person leaves them. Default: "
+               "Whether the arm's power is on and its brakes are released at the beginning, as a person "
+               "leaves them. Default: "
                "they are");
   app.add_option(
       "--hide", options.hide,

@@ -17,7 +17,7 @@ namespace {
 constexpr double kHistoryS = 30;                              // rig time
 constexpr double kStopConnectS = 0.3, kStopDashboardS = 0.5;  // host time
 constexpr double kDashboardS = 2;                             // host time
-constexpr size_t kSentProgramsKept = 64;                      // what the controller tells of a program comes at once
+constexpr size_t kSentProgramsKept = 64;  // what the controller tells of a program comes at once
 constexpr std::chrono::milliseconds kStartGoesOut{
     5};  // what a stop waits for a start that is just being sent
 constexpr double kPowerOnRigS = 40, kPowerOnHostS = 20;  // the controller boots its arm in rig time

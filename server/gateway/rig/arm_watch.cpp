@@ -30,8 +30,8 @@ bool Latches(arm::SafetyMode mode, bool interrupts) {
 }
 
 std::string When(const arm::ArmState& state, const ArmWatch::Doing& doing) {
-  return doing.moving
-             ? absl::StrCat("during program ", state.program_id, ", phase '", arm::PhaseName(state.phase), "'")
+  return doing.moving     ? absl::StrCat("during program ", state.program_id, ", phase '",
+                                         arm::PhaseName(state.phase), "'")
          : doing.powering ? "while the arm was powered up"
                           : "between motions";
 }
@@ -58,8 +58,8 @@ std::string ArmWatch::PowerReason(const arm::ArmState& state, const Doing& doing
   ran_ = false;
   // An emergency stop takes the power away and says more.
   if (!ran || doing.powering || !arm::SafetyPermitsMotion(state.safety_mode).ok()) return "";
-  return absl::StrCat("the arm, which was running, was found in mode ", arm::RobotModeName(state.robot_mode), " ",
-                      When(state, doing), ": somebody powered it off, or it lost its power");
+  return absl::StrCat("the arm, which was running, was found in mode ", arm::RobotModeName(state.robot_mode),
+                      " ", When(state, doing), ": somebody powered it off, or it lost its power");
 }
 
 std::string ArmWatch::ProgramReason(const arm::ArmState& state, const Doing& doing) {

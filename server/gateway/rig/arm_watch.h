@@ -38,7 +38,7 @@ class ArmWatch {
   std::string PowerReason(const arm::ArmState& state, const Doing& doing);
   std::string ProgramReason(const arm::ArmState& state, const Doing& doing);
 
-  double seen_s_ = -1;                             // controller time of the last state looked at; below 0: none yet
+  double seen_s_ = -1;  // controller time of the last state looked at; below 0: none yet
   std::optional<arm::SafetyMode> latched_safety_;  // that was latched last, while it lasts
   bool ran_ = false;                               // the arm was seen running, and not without power since
   uint64_t foreign_programs_ = 0;                  // of arm::ForeignPrograms::count

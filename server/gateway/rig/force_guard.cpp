@@ -39,17 +39,24 @@ Eigen::Vector3d ForceAtRest(const arm::Arm& arm, const Eigen::Vector3d& zeroed_n
 
 absl::Status CheckForceAtRest(const Eigen::Vector3d& at_rest_n, double max_force_n) {
   if (at_rest_n.norm() <= kNoticedShare * max_force_n) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrFormat(
-      "the arm feels %.1f N on the tip at rest, before it moves; at most %.1f N (%.0f %% of limits.max_force_n): "
-      "take away what presses against the tool, or set the payload right, in the controller's installation and in "
-      "limits.payload_kg and limits.payload_cog_mm; a sensor that was zeroed while something pressed forgets it with the "
-      "next power-up",
-      at_rest_n.norm(), kNoticedShare * max_force_n, 100 * kNoticedShare));
+  return absl::FailedPreconditionError(
+      absl::StrFormat("the arm feels %.1f N on the tip at rest, before it moves; at most %.1f N (%.0f %% of "
+                      "limits.max_force_n): "
+                      "take away what presses against the tool, or set the payload right, in the "
+                      "controller's installation and in "
+                      "limits.payload_kg and limits.payload_cog_mm; a sensor that was zeroed while something "
+                      "pressed forgets it with the "
+                      "next power-up",
+                      at_rest_n.norm(), kNoticedShare * max_force_n, 100 * kNoticedShare));
 }
 
 ForceGuard::ForceGuard(const arm::Arm& arm, double max_force_n, std::string what,
                        const Eigen::Vector3d& zeroed_n)
-    : arm_(arm), max_force_n_(max_force_n), allowed_n_(max_force_n), what_(std::move(what)), zeroed_n_(zeroed_n) {
+    : arm_(arm),
+      max_force_n_(max_force_n),
+      allowed_n_(max_force_n),
+      what_(std::move(what)),
+      zeroed_n_(zeroed_n) {
   const absl::StatusOr<arm::ArmState> now = arm.State();
   if (!now.ok()) return;  // whoever watches the motion finds that too
   seen_s_ = now->controller_time_s;

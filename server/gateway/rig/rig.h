@@ -65,8 +65,9 @@ struct RigParts {
 };
 
 struct StopOutcome {
-  uint32_t motions = 0;     // that were under way
-  absl::Status standstill;  // OK: the arm was seen at rest after the stop, with no program that runs; else why not
+  uint32_t motions = 0;  // that were under way
+  absl::Status
+      standstill;  // OK: the arm was seen at rest after the stop, with no program that runs; else why not
 };
 
 class Rig : public source::RigDevice {
@@ -203,10 +204,10 @@ class Rig : public source::RigDevice {
   struct Program {
     uint32_t id = 0;
     source::MotionGuard guard;
-    double max_force_n = 0;   // infinite: the force is a hand's
-    bool let_go = false;      // it was told to move
-    double hung_s = 0;        // the longest hang of its supervisor, host time; 0: none
-    double hung_at_s = 0;     // when that ended
+    double max_force_n = 0;  // infinite: the force is a hand's
+    bool let_go = false;     // it was told to move
+    double hung_s = 0;       // the longest hang of its supervisor, host time; 0: none
+    double hung_at_s = 0;    // when that ended
   };
   // What every wait of a motion asks, every 10 ms or oftener: renews the permit of the heartbeats, and returns why the
   // motion may not go on (the controller's safety mode, its guard).
@@ -263,12 +264,13 @@ class Rig : public source::RigDevice {
 
   std::mutex safety_mutex_;  // of what LookAtSafety knows
   ArmWatch watch_;
-  std::atomic<bool> powering_{false};         // PowerUp is under way
-  std::atomic<bool> closing_{false};          // Close was called
-  std::atomic<uint32_t> given_up_{0};         // the program that was given up last; 0: none
-  std::atomic<bool> left_pressed_{false};     // the last motion did not come to its end: the tool may press
-  Eigen::Vector3d zeroed_n_ = Eigen::Vector3d::Zero();  // ForceGuard: by the last program; of the one that moves
-  double paused_stop_s_ = -1e9;               // host time at which EndPausedProgram sent a stop
+  std::atomic<bool> powering_{false};      // PowerUp is under way
+  std::atomic<bool> closing_{false};       // Close was called
+  std::atomic<uint32_t> given_up_{0};      // the program that was given up last; 0: none
+  std::atomic<bool> left_pressed_{false};  // the last motion did not come to its end: the tool may press
+  Eigen::Vector3d zeroed_n_ =
+      Eigen::Vector3d::Zero();   // ForceGuard: by the last program; of the one that moves
+  double paused_stop_s_ = -1e9;  // host time at which EndPausedProgram sent a stop
   std::mutex watch_mutex_;
   std::condition_variable watch_ends_;
   bool ending_ = false;

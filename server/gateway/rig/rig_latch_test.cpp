@@ -287,7 +287,8 @@ TEST_F(RigLatch, ALinkThatWasLostDuringAMotionLatchesAndBeforeItDoesNot) {
   ASSERT_TRUE(WaitFor([&] { return !rig_->StopReason().empty(); }));
   arm_->SetLink(absl::OkStatus());
   EXPECT_EQ(homing.get().code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(rig_->StopReason(), AllOf(HasSubstr("the loss of the arm's controller"), HasSubstr("during a motion")));
+  EXPECT_THAT(rig_->StopReason(),
+              AllOf(HasSubstr("the loss of the arm's controller"), HasSubstr("during a motion")));
   EXPECT_EQ(Home().code(), absl::StatusCode::kAborted);
 }
 
@@ -351,7 +352,9 @@ TEST_F(RigLatch, AStopThatIsNotHeededIsSentAnotherWayAndElseNotConfirmed) {
     arm_->SetProgram(9, MotionPhase::kTransit, RuntimeState::kPlaying);
     arm_->heeds_stops = false, arm_->heeds_other_stops = heeds_other;
     auto stopping = std::async(std::launch::async, [&] { return rig_->Stop("a test", "ana"); });
-    const auto ended = [&] { return stopping.wait_for(std::chrono::seconds(0)) == std::future_status::ready; };
+    const auto ended = [&] {
+      return stopping.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    };
     while (!ended()) {
       clock_.Advance(0.05);
       arm_->Change([](ArmState* state) { state->joints_rad[0] += 1e-4; });
@@ -361,8 +364,9 @@ TEST_F(RigLatch, AStopThatIsNotHeededIsSentAnotherWayAndElseNotConfirmed) {
     EXPECT_EQ(outcome.standstill.ok(), heeds_other) << outcome.standstill;
     EXPECT_EQ(arm_->other_stops, 1);
     if (!heeds_other) {
-      EXPECT_THAT(std::string(outcome.standstill.message()),
-                  AllOf(HasSubstr("NOT CONFIRMED"), HasSubstr("a program runs on"), HasSubstr("emergency stop")));
+      EXPECT_THAT(
+          std::string(outcome.standstill.message()),
+          AllOf(HasSubstr("NOT CONFIRMED"), HasSubstr("a program runs on"), HasSubstr("emergency stop")));
     }
     EXPECT_THAT(rig_->StopReason(), HasSubstr("by ana (a test)"));
     End();

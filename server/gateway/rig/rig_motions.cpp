@@ -67,7 +67,8 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   powering_ = true;
   absl::Status status = parts_.arm->PowerOn(guard);
   // The states report it a little later than the dashboard.
-  for (const double until_s = NowS() + kPatienceS; status.ok() && !parts_.arm->Ready().ok() && NowS() < until_s;) {
+  for (const double until_s = NowS() + kPatienceS;
+       status.ok() && !parts_.arm->Ready().ok() && NowS() < until_s;) {
     status = guard();
     parts_.changes->WaitForChange(parts_.changes->count(), 0.01);
   }
@@ -75,7 +76,8 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   if (status.ok()) zeroed_n_.setZero();
   if (!status.ok()) {
     if (!parts_.arm->State().ok())
-      Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(), ")"));
+      Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(),
+                         ")"));
     // What was taken back is not taken for somebody else's doing.
     const auto off = [this] {
       const absl::StatusOr<arm::ArmState> now = parts_.arm->State();

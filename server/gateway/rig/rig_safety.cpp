@@ -76,8 +76,8 @@ void Rig::EndPausedProgram() {
     return;
   paused_stop_s_ = NowS();
   const absl::Status ended = parts_.arm->Stop();
-  spdlog::warn("program {}, which was given up, is paused on the controller and is ended: {}", now->program_id,
-               ended.ok() ? "sent" : std::string(ended.message()));
+  spdlog::warn("program {}, which was given up, is paused on the controller and is ended: {}",
+               now->program_id, ended.ok() ? "sent" : std::string(ended.message()));
 }
 
 void Rig::WatchSafety() {
@@ -105,7 +105,8 @@ absl::Status Rig::LatchInterruption() {
                                             "': a program's id and what it did were expected"));
   // Releasing brakes has no program that could say how far it came.
   if (program_id == 0) {
-    Latch(absl::StrCat("by the start of the gateway (", parts.second, " was under way when the gateway ended)"));
+    Latch(absl::StrCat("by the start of the gateway (", parts.second,
+                       " was under way when the gateway ended)"));
     audit().Write("latched", {{"what", parts.second}}).IgnoreError();
   } else {
     TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(program_id, parts.second));

@@ -13,18 +13,20 @@
 namespace touchstone::gateway {
 namespace {
 
-constexpr double kLookPeriodS = 0.01;    // host time; how soon a lost lease is noticed
-constexpr double kHungS = 0.4;           // host time between two looks in which heartbeats may have ceased
-constexpr double kAfterHangS = 1;        // host time after it in which a failure may come of it
-constexpr double kProgramStartsS = 2;    // host time that a program may take until its phase is reported
-constexpr double kPreparedRestS = 0.08;  // rig time at rest before a program is let go, for the mean of the force
-constexpr double kEndedS = 0.5;          // host time without a program after which ours has ended
+constexpr double kLookPeriodS = 0.01;  // host time; how soon a lost lease is noticed
+constexpr double kHungS = 0.4;         // host time between two looks in which heartbeats may have ceased
+constexpr double kAfterHangS = 1;      // host time after it in which a failure may come of it
+constexpr double kProgramStartsS = 2;  // host time that a program may take until its phase is reported
+constexpr double kPreparedRestS =
+    0.08;                        // rig time at rest before a program is let go, for the mean of the force
+constexpr double kEndedS = 0.5;  // host time without a program after which ours has ended
 
 // Of a stop, host time but for kStillS.
 constexpr double kFirstWayS = 0.15, kStandstillS = 1.5;
-constexpr double kStillS = 0.05;      // controller time over which the joints must not move
-constexpr double kStillRad = 3e-4;    // over that; noise of a standing joint is about 2.3e-5 (tests/rig/controller)
-constexpr double kGoneS = 0.3;        // without a state of the controller
+constexpr double kStillS = 0.05;  // controller time over which the joints must not move
+constexpr double kStillRad =
+    3e-4;                       // over that; noise of a standing joint is about 2.3e-5 (tests/rig/controller)
+constexpr double kGoneS = 0.3;  // without a state of the controller
 
 bool IsPaused(arm::RuntimeState state) {
   return state == arm::RuntimeState::kPausing || state == arm::RuntimeState::kPaused ||
@@ -60,8 +62,8 @@ absl::Status Rig::Launch(Program* program, const char* what,
   if (!sent.ok()) return went_out ? GiveUp(program, what, sent) : sent;
   Eigen::Vector3d prepared_n = Eigen::Vector3d::Zero();
   Eigen::Matrix3d tip_from_base = Eigen::Matrix3d::Identity();
-  TOUCHSTONE_RETURN_IF_ERROR(Supervise(
-      program, kProgramStartsS + 1, what, [&](const arm::ArmState& newest) -> absl::StatusOr<bool> {
+  TOUCHSTONE_RETURN_IF_ERROR(
+      Supervise(program, kProgramStartsS + 1, what, [&](const arm::ArmState& newest) -> absl::StatusOr<bool> {
         double first_s = newest.controller_time_s;
         int count = 0;
         prepared_n.setZero();
@@ -97,8 +99,8 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
   };
   // Of every state since the last look: none in between may be missed.
   const auto look_back = [&](const arm::ArmState& newest) -> absl::Status {
-    for (const arm::ArmState& state :
-         parts_.arm->History(states_seen_s < 0 ? newest.controller_time_s : states_seen_s, newest.controller_time_s)) {
+    for (const arm::ArmState& state : parts_.arm->History(
+             states_seen_s < 0 ? newest.controller_time_s : states_seen_s, newest.controller_time_s)) {
       states_seen_s = state.controller_time_s;
       if (const absl::Status safety = arm::SafetyPermitsMotion(state.safety_mode); !safety.ok()) {
         LookAtSafety();
@@ -124,8 +126,8 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
     if (const absl::Status light = force.Check(*state); !light.ok()) return give_up(light);
     if (const absl::Status normal = look_back(*state); !normal.ok()) return give_up(normal);
     if (seen && state->program_id != program->id) {
-      const std::string taken = absl::StrCat("program ", program->id, " was replaced by program ", state->program_id,
-                                             " during ", what);
+      const std::string taken = absl::StrCat("program ", program->id, " was replaced by program ",
+                                             state->program_id, " during ", what);
       Latch(absl::StrCat("by the arm's controller (", taken, ")"));
       return give_up(absl::UnavailableError(taken));
     }
@@ -171,15 +173,17 @@ absl::Status Rig::GiveUp(Program* program, const char* what, const absl::Status&
     const std::string during = absl::StrCat(" during ", what, ", program ", program->id);
     // Whether the watchdog had ended the program before cannot be told any more.
     if (program->hung_s > 0 && NowS() - program->hung_at_s < kAfterHangS)
-      Latch(absl::StrCat("by the gateway (it hung for ", ShortestNumber(std::round(10 * program->hung_s) / 10), " s",
-                         during, ")"));
+      Latch(absl::StrCat("by the gateway (it hung for ",
+                         ShortestNumber(std::round(10 * program->hung_s) / 10), " s", during, ")"));
     if (!reachable.ok())
       Latch(absl::StrCat("by the loss of the arm's controller (", reachable.message(), during, ")"));
-    if (closing_ && !stopped_) Latch(absl::StrCat("by the end of the gateway (it was told to end", during, ")"));
+    if (closing_ && !stopped_)
+      Latch(absl::StrCat("by the end of the gateway (it was told to end", during, ")"));
   }
   std::string also;
   if (!stop.ok()) absl::StrAppend(&also, " (and: ", stop.message(), ")");
-  if (const absl::Status still = program->let_go ? ConfirmStandstill(stopped_s) : absl::OkStatus(); !still.ok()) {
+  if (const absl::Status still = program->let_go ? ConfirmStandstill(stopped_s) : absl::OkStatus();
+      !still.ok()) {
     absl::StrAppend(&also, " (and: ", still.message(), ")");
     Latch(absl::StrCat("by the gateway (after program ", program->id, ": ", still.message(), ")"));
   }
@@ -203,9 +207,11 @@ absl::Status Rig::ConfirmStandstill(double from_s) {
     if (now.ok()) heard_s = now_s;
     if (now.ok() && now->controller_time_s < from_s) from_s = now->controller_time_s;  // started anew
     if (now.ok() && now->controller_time_s - from_s >= kStillS &&
-        (now->runtime_state == arm::RuntimeState::kStopped || now->runtime_state == arm::RuntimeState::kPaused)) {
+        (now->runtime_state == arm::RuntimeState::kStopped ||
+         now->runtime_state == arm::RuntimeState::kPaused)) {
       double farthest_rad = 0;
-      for (const arm::ArmState& state : parts_.arm->History(now->controller_time_s - kStillS, now->controller_time_s))
+      for (const arm::ArmState& state :
+           parts_.arm->History(now->controller_time_s - kStillS, now->controller_time_s))
         for (size_t i = 0; i < state.joints_rad.size(); ++i)
           farthest_rad = std::max(farthest_rad, std::abs(state.joints_rad[i] - now->joints_rad[i]));
       if (farthest_rad < kStillRad) return absl::OkStatus();

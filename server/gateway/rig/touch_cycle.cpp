@@ -44,8 +44,8 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
       (plan.motion.end.translation() - plan.motion.transit.back().translation()).normalized();
   bool ended = false;
   std::optional<double> pressed_from_m;
-  TOUCHSTONE_RETURN_IF_ERROR(Supervise(
-      &program, limit_s, kApproach, [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
+  TOUCHSTONE_RETURN_IF_ERROR(
+      Supervise(&program, limit_s, kApproach, [&](const arm::ArmState& state) -> absl::StatusOr<bool> {
         if (state.phase == arm::MotionPhase::kDone) return true;
         TOUCHSTONE_ASSIGN_OR_RETURN(const effector::EffectorTouch contacts, parts_.effector->Touch());
         const int count = contacts.Contacts();

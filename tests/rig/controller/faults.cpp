@@ -64,8 +64,9 @@ std::string Complaint(const Row& row, double value) {
     case Range::kSwitch:
       return value == 0 || value == 1 ? "" : which + "must be 0 or 1";
     case Range::kMode:
-      return value >= 0 && value <= 255 && value == std::floor(value) ? ""
-                                                                      : which + "must be a whole number from 0 to 255";
+      return value >= 0 && value <= 255 && value == std::floor(value)
+                 ? ""
+                 : which + "must be a whole number from 0 to 255";
     case Range::kSigned:
       return "";
   }

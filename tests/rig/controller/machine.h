@@ -196,7 +196,7 @@ class Machine : public ScriptHost {
   bool SafetyPermitsMotion() const { return safety_mode_ == kNormal || safety_mode_ == kReduced; }
   // As a safety function does: the program is paused, not ended (README.md), and the arm brakes.
   void PauseForSafety();
-  void TakeSafetyMode(int mode);  // of a fault
+  void TakeSafetyMode(int mode);                                             // of a fault
   Eigen::Vector3d ForceOnTip(const Eigen::Isometry3d& base_from_tip) const;  // base frame, before any zeroing
   void LookAtFaults();
   void Rescale();

@@ -108,7 +108,8 @@ Vector6 Machine::TipSpeed(const JointMotion& joints) const {
 Eigen::Vector3d Machine::ForceOnTip(const Eigen::Isometry3d& base_from_tip) const {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   if (!faults_) return force;
-  if (tip_) force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * base_from_tip.linear().col(2);
+  if (tip_)
+    force -= faults_->Get("finger_stiffness") * 1e3 * tip_->IndentationM() * base_from_tip.linear().col(2);
   force.z() -= faults_->Get("force_offset_n");
   return force;
 }
