@@ -91,7 +91,7 @@ COMMANDS = (
     Command("import .csv", ("session", "import", "IN/set.csv", "--session", "new", "-o", "OUT/journal.db")),
     Command("import .h5", ("session", "import", "IN/set.h5", "--session", "new", "-o", "OUT/journal.db")),
     Command("import beside others", ("session", "import", "IN/set.csv", "--session", "new", "-o", "OUT/session.db"), before=("session.db",)),
-    Command("delete from a journal", ("session", "delete", "OUT/session.db", "a", "--yes"), before=("session.db",)),
+    Command("delete from a journal", ("session", "delete", "OUT/session.db", "a"), before=("session.db",)),
     Command("image set to .h5", ("session", "export", "IN/photos", "-o", "OUT/photos.h5")),
     Command("image set from .h5", ("session", "import", "IN/photos.h5", "-o", "OUT/photos"), together=True),
     Command("image set fixed", ("session", "fix", "IN/photos", "--mirror", "left-right", "-o", "OUT/photos"), together=True),
@@ -105,10 +105,9 @@ COMMANDS = (
     Command("picture, depth and mask", ("capture", "lat20", "--approach", "0,0,-1", "--image", "32x32", "--depth", "--mask", "--renderer",
                                         "cpu", "-o", "OUT/side.png")),
     Command("reports", ("compare", "IN/set.csv", "--model", "IN/model.yaml", "--html", "OUT/report.html", "--json", "OUT/report.json")),
-    Command("token", ("token", "new", "ana", "--role", "operator", "--add-to", "OUT/tokens", "-o", "OUT/ana.token")),
     Command("Python's measurements", ("from touchstone import measurements as m; m.write_measurements('OUT/set.csv', m.read_plan('IN/plan.csv'))",),
             python=True),
-    *(Command(f"dataset, {kind}", ("stream", "--samples", "12", "--samples-per-shard", "6", "--format", kind, "--out", "OUT/data"), resumes=True)
+    *(Command(f"dataset, {kind}", ("stream", "--samples", "12", "--shard-size", "6", "--to", kind, "--out", "OUT/data"), resumes=True)
       for kind in ("hdf5", "webdataset", "folder")),
 )
 
