@@ -115,7 +115,7 @@ class Server(Program):
                  listen: str = "127.0.0.1:0", memory_mib: int | None = None):
         """max_files: soft and hard limit of open files; memory_mib: of its address space; None: as this process has it."""
         # By a program, not by preexec_fn: that makes Python fork, which gRPC's fork handlers can hold up for good.
-        limited = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
+        limited: tuple[str, ...] = () if max_files is None else ("prlimit", f"--nofile={max_files}:{max_files}")
         if memory_mib is not None:
             limited += ("prlimit", f"--as={memory_mib << 20}")
         super().__init__([*limited, GATEWAY if gateway else SERVER, "--listen", listen, *SMALL, *options],
