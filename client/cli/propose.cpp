@@ -82,8 +82,8 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
   v1::ProposeRequest request;
   request.set_touches(options.touches.value_or(0));
   request.set_photographs(options.photographs.value_or(0));
-  const bool both = request.evidence().has_images() &&
-                    request.evidence().measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET;
+  const bool both = comparison->evidence().has_images() &&
+                    comparison->evidence().measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET;
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
                                 *request.mutable_evidence() = comparison->evidence();

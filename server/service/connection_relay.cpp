@@ -27,7 +27,7 @@ constexpr int kReadsOfATurn = 4;
 // What a client has sent and has not been passed on, at the most, about.
 constexpr size_t kMaxPendingBytes = 64 << 10;
 constexpr int kTickMs = 5, kIdleTickMs = 200;
-constexpr uint32_t kNoError = 0, kEnhanceYourCalm = 11;
+constexpr uint32_t kNoError = 0, kProtocolError = 1, kEnhanceYourCalm = 11;
 // A connection that is for a stop lives no longer.
 constexpr double kOnlyStopS = 10;
 
@@ -239,7 +239,15 @@ bool ConnectionRelay::Thread::Greet(Connection* c) {
     if (read.state == Wire::State::kEnded) return false;
     if (read.state == Wire::State::kBlocked) return true;
     said.append(scratch_.data(), read.bytes);
-    if (!absl::StartsWith(kClientPreface, said)) return false;
+    if (!absl::StartsWith(kClientPreface, said)) {
+      // What gRPC would say at once: a client that speaks TLS here, or HTTP/1, finds that this is something else, and not
+      // a server that is still starting. What it has sent is read first, or closing would take the answer back.
+      while (c->wire->Read(scratch_.data(), scratch_.size()).state == Wire::State::kMoved) {
+      }
+      c->wire->Write(FrameOf({0, FrameType::kSettings, 0, 0}, "") +
+                     GoAway(0, kProtocolError, "touchstone: HTTP/2 was expected here"));
+      return false;
+    }
   }
   c->shared->spoke_ = true;
   return OpenInner(c);

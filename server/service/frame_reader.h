@@ -14,6 +14,7 @@ enum class FrameType : uint8_t {
   kData = 0,
   kHeaders = 1,
   kRstStream = 3,
+  kSettings = 4,
   kGoAway = 7,
   kWindowUpdate = 8,
   kContinuation = 9,

@@ -19,6 +19,7 @@ class StatesOnly : public ScriptedArm {
   void Add(double controller_s, double speed_m_s, const Eigen::Vector3d& force_n) {
     Change([&](arm::ArmState* state) {
       state->controller_time_s = controller_s;
+      state->base_from_tip.setIdentity();
       state->tip_velocity_m_s = {0, 0, -speed_m_s};
       state->tip_force_n = force_n;
     });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -60,23 +61,21 @@ absl::Status Rig::Launch(Program* program, const char* what,
     return allowed;
   });
   if (!sent.ok()) return went_out ? GiveUp(program, what, sent) : sent;
-  Eigen::Vector3d prepared_n = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d tip_from_base = Eigen::Matrix3d::Identity();
-  TOUCHSTONE_RETURN_IF_ERROR(
+  const absl::Status prepared =
       Supervise(program, kProgramStartsS + 1, what, [&](const arm::ArmState& newest) -> absl::StatusOr<bool> {
         double first_s = newest.controller_time_s;
         int count = 0;
-        prepared_n.setZero();
+        Eigen::Vector3d sum_n = Eigen::Vector3d::Zero();
         for (const arm::ArmState& state : parts_.arm->History(sent_s, newest.controller_time_s)) {
           if (state.program_id != program->id) continue;
           first_s = std::min(first_s, state.controller_time_s);
-          prepared_n += state.tip_force_n, ++count;
+          sum_n += state.tip_force_n, ++count;
         }
-        prepared_n /= std::max(count, 1);
-        tip_from_base = newest.base_from_tip.linear().transpose();
+        // Also if the motion is given up here: the sensor was zeroed.
+        zeroed_n_ = newest.base_from_tip.linear().transpose() * (before_n - sum_n / std::max(count, 1));
         return newest.controller_time_s - first_s >= kPreparedRestS;
-      }));
-  zeroed_n_ = tip_from_base * (before_n - prepared_n);
+      });
+  TOUCHSTONE_RETURN_IF_ERROR(prepared);
   const absl::Status moves = parts_.arm->BeginMotion(program->id, [&] {
     const absl::Status allowed = program->guard();
     program->let_go = allowed.ok();
@@ -90,7 +89,10 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
   const double began_s = NowS();
   double at_rest_since_s = 0, looked_s = began_s;
   bool seen = program->let_go;  // its id was reported
-  ForceGuard force(*parts_.arm, program->max_force_n, what, zeroed_n_);
+  // Of a program that has not been let go only the sensor's zero changes.
+  ForceGuard force(*parts_.arm,
+                   program->let_go ? program->max_force_n : std::numeric_limits<double>::infinity(), what,
+                   zeroed_n_);
   double states_seen_s = -1;  // controller time
   const auto give_up = [&](const absl::Status& why) {
     if (const double now_s = NowS(); now_s - looked_s > kHungS)
