@@ -51,7 +51,7 @@ def test_its_commands_do_what_it_says(tmp_path):
     assert len(page) >= 14 and sum(refused for *_, refused in page) == 1
     shell = re.search(r"```sh\n(.*?)```", PAGE, re.DOTALL).group(1)
     assert ADDRESS in shell
-    with emulated_rig(tmp_path / "rig", SPEEDUP, "--object", "lat20") as address:
+    with emulated_rig(tmp_path / "rig", SPEEDUP, "--object", "lat20", "--power-off") as address:
         shutil.copy(tmp_path / "rig/calibration.yaml", tmp_path)
         for number, command, refused in page:
             status, output = run(shell.replace(ADDRESS, address), command, tmp_path)

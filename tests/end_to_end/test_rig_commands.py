@@ -101,13 +101,15 @@ def journal_of_gateway(rig):
 
 @pytest.fixture
 def rig_with_camera(tmp_path):
-    with emulated_rig(tmp_path / "rig", SPEEDUP) as address:
+    with emulated_rig(tmp_path / "rig", SPEEDUP, "--power-off") as address:
         yield address
 
 
 def test_status_shows_every_part_and_that_it_is_emulated(rig_with_camera):
     rig = rig_with_camera
-    # Looking powers nothing on.
+    # Looking powers nothing on, nor does a motion that is asked for.
+    assert "POWER_OFF" in touchstone("rig", "status", server=rig)
+    assert "rig power-on" in " ".join(touchstone("rig", "home", server=rig, code=4).split())
     assert "POWER_OFF" in touchstone("rig", "status", server=rig)
     touchstone("rig", "power-on", server=rig)
     assert "RUNNING" in touchstone("rig", "status", server=rig)

@@ -174,7 +174,8 @@ def sessions_of(path: pathlib.Path) -> dict[str, str]:
     return found
 
 
-JOURNAL_ENDINGS = (".db", ".db-wal", ".db-shm", ".db.lock")
+# SQLite needs its own files beside a journal, to mend it when it is opened next.
+JOURNAL_ENDINGS = (".db", ".db-journal", ".db-wal", ".db-shm", ".db.lock")
 
 
 def content_of(folder: pathlib.Path) -> dict[str, object]:
@@ -190,7 +191,7 @@ def content_of(folder: pathlib.Path) -> dict[str, object]:
 
 
 def is_temporary(name: str) -> bool:
-    return name.endswith((".part", ".draft")) or ".part/" in name or ".lock" in name
+    return name.endswith((".part", ".part-journal", ".draft")) or ".part/" in name or ".lock" in name
 
 
 def differences(command: Command, fault: Fault, found: dict, before: dict, after: dict, done: bool) -> list[str]:

@@ -78,7 +78,7 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
 
     def Stop(self, request, context):
         self.stopped.append(request.reason)
-        return control_pb2.StopResponse(aborted_touches=1)
+        return control_pb2.StopResponse(aborted_touches=1, standstill=True)
 
     def Reset(self, request, context):
         self.resets.append((request.holder, request.reason))
