@@ -33,13 +33,14 @@ def commands():
 
 
 def run(shell, command, folder):
-    """(status, output). One that watches is ended as Ctrl-C would once it has said something."""
+    """(status, output). One that watches is ended once it has said something: by SIGTERM, since a shell
+    that was started in the background lets its programs ignore SIGINT."""
     environment = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"}
     process = subprocess.Popen(["bash", "-c", f"{shell}\n{command}"], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
     if command.endswith("--watch"):
         first = process.stdout.readline()
-        os.killpg(process.pid, signal.SIGINT)
+        os.killpg(process.pid, signal.SIGTERM)
         process.communicate(timeout=PATIENCE_S)
         return 0 if first else 1, first
     output, _ = process.communicate(timeout=PATIENCE_S)
