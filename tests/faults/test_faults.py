@@ -55,7 +55,8 @@ def test_a_server_lives_within_the_memory_limit_of_its_own_cgroup(limit_mib, str
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("name", ["export .h5", "import .csv", pytest.param("", marks=pytest.mark.second_tier(
+@pytest.mark.parametrize("name", ["export .h5", pytest.param("import .csv", marks=pytest.mark.second_tier(
+    "long: two hundred kills of an import")), pytest.param("", marks=pytest.mark.second_tier(
     "repeated: every other command that writes"), id="all")])
 def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
     # For one command, those of the faults that differ in what the program can still do; the tests in C++ have all of them.
