@@ -141,11 +141,11 @@ TEST_F(ArmWatchTest, AControllerThatWasStartedAnewLatchesIfItsArmHadRun) {
 
 TEST_F(ArmWatchTest, AForeignProgramLatchesAtOnceAndWithItsName) {
   Look(kMoving);
-  arm_.foreign = {1, "pick_and_place\x1b[2J"};
+  arm_.BeginForeign("pick_and_place\x1b[2J");
   EXPECT_THAT(Look(kMoving),
               ElementsAre(AllOf(HasSubstr("pick_and_place"), testing::Not(HasSubstr("\x1b")))));
   EXPECT_THAT(Look(kMoving), IsEmpty());
-  arm_.foreign = {2, "pick_and_place"};
+  arm_.BeginForeign("pick_and_place");
   EXPECT_THAT(Look(), ElementsAre(HasSubstr("pick_and_place")));
 }
 

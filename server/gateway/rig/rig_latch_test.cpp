@@ -329,7 +329,7 @@ TEST_F(RigLatch, AProgramOfSomebodyElseEndsAMotionAndLatches) {
   Start();
   auto homing = HomeLater();
   ASSERT_TRUE(WaitFor([&] { return arm_->motions == 1; }));
-  arm_->foreign = {1, "swing"};
+  arm_->BeginForeign("swing");
   PassUnderSupervision(60,
                        [&] { return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
   EXPECT_EQ(homing.get().code(), absl::StatusCode::kAborted);

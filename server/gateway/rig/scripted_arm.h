@@ -1,6 +1,7 @@
 // An arm that a test moves by hand: it sends what it is told to, and keeps count of what it was sent. For tests.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <mutex>
@@ -60,7 +61,7 @@ class ScriptedArm : public arm::Arm {
 
   absl::StatusOr<arm::ArmState> State() const override {
     std::lock_guard<std::mutex> lock(mutex_);
-    if (!link.ok()) return link;
+    if (!link_.ok()) return link_;
     return state_;
   }
   std::vector<arm::ArmState> History(double from_s, double to_s) const override {
@@ -73,7 +74,7 @@ class ScriptedArm : public arm::Arm {
   void SetLink(const absl::Status& status) {
     {
       std::lock_guard<std::mutex> lock(mutex_);
-      link = status;
+      link_ = status;
     }
     if (changes_ != nullptr) changes_->Notify();
   }
@@ -109,7 +110,15 @@ class ScriptedArm : public arm::Arm {
     if (heeds_other_stops) Rest();
     return absl::OkStatus();
   }
-  arm::ForeignPrograms Foreign() const override { return foreign; }
+  arm::ForeignPrograms Foreign() const override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return foreign_;
+  }
+  // One more program of somebody else began.
+  void BeginForeign(const std::string& name) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    ++foreign_.count, foreign_.newest = name;
+  }
   absl::Status PowerOn(const arm::StartGuard&) override { return absl::OkStatus(); }
   void SendHeartbeat() override { ++heartbeats; }
   timing::ClockEstimate ControllerClock() const override { return {}; }
@@ -122,8 +131,6 @@ class ScriptedArm : public arm::Arm {
   std::function<void(arm::ArmState*)> while_prepared;  // a state between a program's settings and its motion
   std::atomic<bool> heeds_stops{true}, heeds_other_stops{true};
   std::atomic<int> programs{0}, motions{0}, stops{0}, other_stops{0}, heartbeats{0};
-  arm::ForeignPrograms foreign;
-  absl::Status link;
 
  private:
   void Rest() {
@@ -135,6 +142,8 @@ class ScriptedArm : public arm::Arm {
   mutable std::mutex mutex_;
   arm::ArmState state_;
   std::vector<arm::ArmState> history_;
+  arm::ForeignPrograms foreign_;
+  absl::Status link_;
 };
 
 }  // namespace touchstone::gateway
