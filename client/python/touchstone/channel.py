@@ -14,6 +14,10 @@ from typing import Any
 
 import grpc
 
+# gRPC's own handlers of fork() wait for its threads, at times for ever (2 of 120 forks with gRPC 1.51 and signs of life), and
+# are of no use: after a fork this package refuses to call (connection.py). Read when the first channel is made.
+os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
+
 
 def _split(address: str) -> tuple[str, bool]:
     """Host of "host:port", without brackets, and whether it is such an address."""
