@@ -384,6 +384,19 @@ TEST_F(RigLatch, AnArmThatIsPressedAtRestDoesNotBeginToMove) {
   EXPECT_EQ(arm_->programs, 0);
 }
 
+// Every program zeroes the sensor: what is felt before it, noise or a payload that is a little wrong, must not add up.
+TEST_F(RigLatch, WhatIsZeroedByManyProgramsDoesNotAddUp) {
+  Start();
+  arm_->arrives = true;
+  arm_->while_prepared = [](ArmState* state) { state->tip_force_n.setZero(); };
+  for (int k = 0; k < 30; ++k) {
+    arm_->Change([](ArmState* state) { state->tip_force_n = {0, 0, -1}; });
+    arm_->Pass(0.3);
+    const absl::Status home = Home();
+    ASSERT_TRUE(home.ok()) << k << ": " << home;
+  }
+}
+
 // --- What a process before this one left
 
 TEST_F(RigLatch, ATouchThatWasUnderWayLatchesWithWhereTheArmStands) {

@@ -94,7 +94,9 @@ class ScriptedArm : public arm::Arm {
   }
   absl::Status BeginMotion(uint32_t id, const arm::StartGuard& guard) override {
     if (absl::Status allowed = guard(); !allowed.ok()) return allowed;
-    SetProgram(id, arm::MotionPhase::kTransit, arm::RuntimeState::kPlaying);
+    SetProgram(id, arrives ? arm::MotionPhase::kDone : arm::MotionPhase::kTransit,
+               arm::RuntimeState::kPlaying);
+    if (arrives) Rest();
     ++motions;  // last: a test that sees it changes the state
     return absl::OkStatus();
   }
@@ -129,6 +131,7 @@ class ScriptedArm : public arm::Arm {
 
   std::function<void()> before_send;
   std::function<void(arm::ArmState*)> while_prepared;  // a state between a program's settings and its motion
+  std::atomic<bool> arrives{false};                    // a motion is done as soon as it begins
   std::atomic<bool> heeds_stops{true}, heeds_other_stops{true};
   std::atomic<int> programs{0}, motions{0}, stops{0}, other_stops{0}, heartbeats{0};
 

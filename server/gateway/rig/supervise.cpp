@@ -53,7 +53,9 @@ absl::Status Rig::Launch(Program* program, const char* what,
   // A motion that begins where the last one was broken off may begin pressed, to let go.
   const Eigen::Vector3d before_n = ForceAtRest(*parts_.arm, zeroed_n_);
   const double sent_s = ControllerNowS();
-  if (!left_pressed_) TOUCHSTONE_RETURN_IF_ERROR(CheckForceAtRest(before_n, program->max_force_n));
+  const absl::Status at_rest = CheckForceAtRest(before_n, program->max_force_n);
+  const bool pressed = !at_rest.ok();
+  if (!left_pressed_) TOUCHSTONE_RETURN_IF_ERROR(at_rest);
   bool went_out = false;
   const absl::Status sent = send([&] {
     const absl::Status allowed = program->guard();
@@ -71,8 +73,11 @@ absl::Status Rig::Launch(Program* program, const char* what,
           first_s = std::min(first_s, state.controller_time_s);
           sum_n += state.tip_force_n, ++count;
         }
-        // Also if the motion is given up here: the sensor was zeroed.
-        zeroed_n_ = newest.base_from_tip.linear().transpose() * (before_n - sum_n / std::max(count, 1));
+        // Also if the motion is given up here: the sensor was zeroed. Only what pressed counts: otherwise the noise of every
+        // program would add up.
+        zeroed_n_.setZero();
+        if (pressed)
+          zeroed_n_ = newest.base_from_tip.linear().transpose() * (before_n - sum_n / std::max(count, 1));
         return newest.controller_time_s - first_s >= kPreparedRestS;
       });
   TOUCHSTONE_RETURN_IF_ERROR(prepared);
