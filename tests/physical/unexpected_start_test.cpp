@@ -317,6 +317,7 @@ TEST_F(UnexpectedStart, APayloadThatIsSetWrongIsNoticedBeforeAnythingMoves) {
   for (const double offset_n : {12.0, 20.0, 30.0}) {
     emulator_->faults().Set("force_offset_n", offset_n);
     WaitUntil([&] { return std::abs(RigState().arm().tip_force_n().z()) > 11.6; }, "the arm feels it");
+    WaitForRigTime(1);  // longer than the force at rest is averaged over
     const uint64_t motions = emulator_->controller().Count("motions");
     const Answer refused = Touch(lease.token(), FromAbove(), "heavy");
     EXPECT_EQ(refused.status.error_code(), grpc::FAILED_PRECONDITION) << offset_n;
@@ -325,6 +326,7 @@ TEST_F(UnexpectedStart, APayloadThatIsSetWrongIsNoticedBeforeAnythingMoves) {
   }
   emulator_->faults().Set("force_offset_n", 0);
   WaitUntil([&] { return std::abs(RigState().arm().tip_force_n().z()) < 5; }, "the arm feels nothing");
+  WaitForRigTime(1);
   EXPECT_TRUE(Touch(lease.token(), FromAbove(QuickMS()), "heavy").status.ok());
 }
 
