@@ -50,7 +50,7 @@ FrameMeter::Verdict FrameMeter::TakeFrom(bool taken, const char* limit) {
 FrameMeter::Verdict FrameMeter::FromClient(const FrameHead& head, absl::string_view payload,
                                            Clock::Time now) {
   resets_.Fill(now);
-  const Verdict verdict = Judge(head, payload, now);
+  const Verdict verdict = Check(head, payload, now);
   if (verdict != Verdict::kLater) return verdict;
   if (!waiting_) waiting_since_ = now;
   waiting_ = true;
@@ -60,7 +60,7 @@ FrameMeter::Verdict FrameMeter::FromClient(const FrameHead& head, absl::string_v
                            " allows for longer than flood_s = ", LimitInWords(limits_.flood_s), " s"));
 }
 
-FrameMeter::Verdict FrameMeter::Judge(const FrameHead& head, absl::string_view payload, Clock::Time now) {
+FrameMeter::Verdict FrameMeter::Check(const FrameHead& head, absl::string_view payload, Clock::Time now) {
   switch (head.type) {
     case FrameType::kData:
       if (head.Has(kEndStream) || head.length >= kSmallData) return Verdict::kPass;
@@ -69,7 +69,7 @@ FrameMeter::Verdict FrameMeter::Judge(const FrameHead& head, absl::string_view p
       break;
     case FrameType::kHeaders:
     case FrameType::kContinuation: {
-      const Verdict verdict = JudgeBlock(head, payload);
+      const Verdict verdict = CheckBlock(head, payload);
       if (verdict != Verdict::kPass) return verdict;
       if (TakeFrom(frames_.Take(now), "max_frames_per_s") == Verdict::kLater) return Verdict::kLater;
       Count(head);
@@ -95,7 +95,7 @@ FrameMeter::Verdict FrameMeter::Judge(const FrameHead& head, absl::string_view p
   return TakeFrom(frames_.Take(now), "max_frames_per_s");
 }
 
-FrameMeter::Verdict FrameMeter::JudgeBlock(const FrameHead& head, absl::string_view payload) {
+FrameMeter::Verdict FrameMeter::CheckBlock(const FrameHead& head, absl::string_view payload) {
   const bool begins = head.type == FrameType::kHeaders;
   if (begins && only_stop_) {
     if (last_stream_ != 0)

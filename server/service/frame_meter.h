@@ -66,8 +66,8 @@ class FrameMeter {
   void NothingWaits() { waiting_ = false; }
 
  private:
-  Verdict Judge(const FrameHead& head, absl::string_view payload, Clock::Time now);
-  Verdict JudgeBlock(const FrameHead& head, absl::string_view payload);
+  Verdict Check(const FrameHead& head, absl::string_view payload, Clock::Time now);
+  Verdict CheckBlock(const FrameHead& head, absl::string_view payload);
   void Count(const FrameHead& head);
   bool EndCall(uint32_t stream);  // whether it was open
   Verdict Shut(std::string reason);

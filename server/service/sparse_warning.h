@@ -1,4 +1,4 @@
-// Warnings that strangers can cause as often as they like: a flood of them is one line a second in the log.
+// Warnings that any client can cause as often as it likes: a flood of them is one line a second in the log.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-"""Floods of HTTP/2 frames from eight connections, of every kind that strangers can send, while others ask for the state and stop."""
+"""Floods of HTTP/2 frames from eight connections, of every kind that a client without credentials can send, while others ask for state and stop."""
 
 from __future__ import annotations
 

@@ -56,14 +56,18 @@ absl::Status Rig::Launch(Program* program, const char* what,
   const absl::Status at_rest = CheckForceAtRest(before_n, program->max_force_n);
   const bool pressed = !at_rest.ok();
   if (!left_pressed_) TOUCHSTONE_RETURN_IF_ERROR(at_rest);
+  // The program's guard, and what it answered.
+  const auto noting = [program](bool* allowed) {
+    return [program, allowed] {
+      absl::Status answer = program->guard();
+      *allowed = *allowed || answer.ok();
+      return answer;
+    };
+  };
   bool went_out = false;
-  const absl::Status sent = send([&] {
-    const absl::Status allowed = program->guard();
-    went_out = went_out || allowed.ok();
-    return allowed;
-  });
+  const absl::Status sent = send(noting(&went_out));
   if (!sent.ok()) return went_out ? GiveUp(program, what, sent) : sent;
-  const absl::Status prepared =
+  TOUCHSTONE_RETURN_IF_ERROR(
       Supervise(program, kProgramStartsS + 1, what, [&](const arm::ArmState& newest) -> absl::StatusOr<bool> {
         double first_s = newest.controller_time_s;
         int count = 0;
@@ -79,13 +83,8 @@ absl::Status Rig::Launch(Program* program, const char* what,
         if (pressed)
           zeroed_n_ = newest.base_from_tip.linear().transpose() * (before_n - sum_n / std::max(count, 1));
         return newest.controller_time_s - first_s >= kPreparedRestS;
-      });
-  TOUCHSTONE_RETURN_IF_ERROR(prepared);
-  const absl::Status moves = parts_.arm->BeginMotion(program->id, [&] {
-    const absl::Status allowed = program->guard();
-    program->let_go = allowed.ok();
-    return allowed;
-  });
+      }));
+  const absl::Status moves = parts_.arm->BeginMotion(program->id, noting(&program->let_go));
   return moves.ok() ? moves : GiveUp(program, what, moves);
 }
 
@@ -99,9 +98,12 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
                    program->let_go ? program->max_force_n : std::numeric_limits<double>::infinity(), what,
                    zeroed_n_);
   double states_seen_s = -1;  // controller time
+  const auto look_for_hang = [&](double now_s) {
+    if (now_s - looked_s > kHungS) program->hung_s = now_s - looked_s, program->hung_at_s = now_s;
+    looked_s = now_s;
+  };
   const auto give_up = [&](const absl::Status& why) {
-    if (const double now_s = NowS(); now_s - looked_s > kHungS)
-      program->hung_s = now_s - looked_s, program->hung_at_s = now_s;
+    look_for_hang(NowS());
     return GiveUp(program, what, why);
   };
   // Of every state since the last look: none in between may be missed.
@@ -125,8 +127,7 @@ absl::Status Rig::Supervise(Program* program, double limit_s, const char* what,
   for (;;) {
     const uint64_t changes = parts_.changes->count();
     const double now_s = NowS();
-    if (now_s - looked_s > kHungS) program->hung_s = now_s - looked_s, program->hung_at_s = now_s;
-    looked_s = now_s;
+    look_for_hang(now_s);
     if (const absl::Status may = MayGoOn(program->guard); !may.ok()) return give_up(may);
     const absl::StatusOr<arm::ArmState> state = parts_.arm->State();
     if (!state.ok()) return give_up(state.status());
