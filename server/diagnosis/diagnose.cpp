@@ -7,6 +7,8 @@
 #include <mutex>
 #include <optional>
 
+#include <absl/strings/str_cat.h>
+
 #include "server/base/status.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/design/propose.h"
@@ -17,11 +19,11 @@
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/selection/ladder.h"
 #include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/touch_modality.h"
 
 namespace touchstone::diagnosis {
 namespace {
 
-constexpr int kMaxCompetingModels = 4;
 constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is confounded
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
@@ -64,11 +66,10 @@ double Now() {
 // as they were into every model that it gives.
 struct PhotographEffects {
   explicit PhotographEffects(const DiagnosisInput& input) : touches(input), given(input.model) {
-    model::Model without = *input.model;
-    without.effects.clear();
     for (const model::EffectInstance& instance : input.model->effects)
-      (instance.effect->of_photos() ? effects : without.effects).push_back(instance);
-    if (!effects.empty()) touches.model = std::make_shared<const model::Model>(std::move(without));
+      if (instance.effect->of_photos()) effects.push_back(instance);
+    if (!effects.empty())
+      touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
   }
   model::Model With(model::Model model) const {
     model.effects.insert(model.effects.end(), effects.begin(), effects.end());
@@ -103,53 +104,25 @@ void AddSentences(report::Diagnosis* diagnosis) {
   diagnosis->summary = report::Summarize(*diagnosis);
 }
 
-// The step with the closest competing effect decides what further touches are to tell. Null: no step has one.
-// `always`: even if the data can tell the two apart already.
-const selection::SelectedStep* MostConfounded(const selection::SelectionResult& selection, bool always) {
-  const selection::SelectedStep* closest = nullptr;
-  for (const selection::SelectedStep& step : selection.steps) {
-    if (step.competing.empty() || !(always || step.competing[0].equivalent)) continue;
-    if (closest == nullptr ||
-        step.competing[0].relative_log_evidence > closest->competing[0].relative_log_evidence)
-      closest = &step;
-  }
-  return closest;
-}
-
-// The improved model, named after the step, and the models that compete with it.
-std::vector<design::CompetingModel> ModelsToTellApart(const selection::SelectionResult& selection,
-                                                      const selection::SelectedStep& step,
-                                                      const model::Model& improved) {
-  std::vector<design::CompetingModel> models = {
-      {inference::NameOf(*selection.fit.model.base().effects[step.effect].effect),
-       std::make_shared<const model::Model>(improved)}};
-  for (const selection::CompetingEffect& other : step.competing) {
-    if (!other.equivalent && models.size() > 1) break;
-    if (static_cast<int>(models.size()) == kMaxCompetingModels) break;
-    models.push_back({other.name, std::make_shared<const model::Model>(other.model)});
-  }
-  return models;
-}
-
 // Touches that would tell what fits equally well apart. Always asked for by Propose; Diagnose asks only where
 // something is confounded.
 absl::Status AddNextTouches(const selection::Workspace& workspace,
                             const selection::SelectionResult& selection, const selection::Ladder& ladder,
                             int max_touches, bool always, report::Diagnosis* diagnosis) {
-  const selection::SelectedStep* closest = MostConfounded(selection, always);
-  if (closest == nullptr && !always) return absl::OkStatus();
-  std::vector<design::CompetingModel> models = {
-      {"the model as it is", std::make_shared<const model::Model>(ladder.improved)}};
-  if (closest != nullptr) models = ModelsToTellApart(selection, *closest, ladder.improved);
+  const engine::ExplanationsLeft left =
+      engine::FindExplanationsLeft(selection.fit, selection.steps, ladder.improved);
+  if (!left.confounded && !always) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(
       diagnosis->next_touches,
-      design::ProposeTouches(*workspace.searched, models, ladder.noise_floor.sigma_s, max_touches,
+      design::ProposeTouches(*workspace.searched, left.models, ladder.noise_floor.sigma, max_touches,
                              workspace.input.seed, workspace.context.pool));
   if (!always || !diagnosis->next_touches.empty()) return absl::OkStatus();
   diagnosis->warnings.push_back(
-      closest == nullptr ? "No touch would tell more than those at hand."
-                         : "No touch of this rig tells " + models[0].name + " from " + models[1].name + ": " +
-                               selection::DiscriminatingMeasurement({models[0].name, models[1].name}));
+      left.models.size() < 2
+          ? "No touch would tell more than those at hand."
+          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name,
+                         ": ",
+                         engine::DiscriminatingMeasurement({left.models[0].name, left.models[1].name})));
   return absl::OkStatus();
 }
 
@@ -171,7 +144,7 @@ void AddLadder(const selection::Ladder& ladder, const PhotographEffects& photogr
   diagnosis->reducible_share = ReducibleShare(ladder.noise_floor, *diagnosis->initial);
   diagnosis->refitted = ladder.refitted;
   diagnosis->steps = ladder.steps;
-  for (selection::LadderStep& step : diagnosis->steps) step.model = photographs.With(std::move(step.model));
+  for (engine::LadderStep& step : diagnosis->steps) step.model = photographs.With(std::move(step.model));
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
   diagnosis->candidates = ladder.candidates;
@@ -192,7 +165,7 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const PhotographEffects& photo
   ProgressGate gate(context);
   DiagnosisContext gated = context;
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<selection::DataProblem> problems,
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<engine::DataProblem> problems,
                               checks::FindDataProblems(input, gated));
   if (!problems.empty()) {
     report::Diagnosis diagnosis = CheckDataReport(input, gated, std::move(problems));
@@ -230,7 +203,7 @@ absl::StatusOr<report::Diagnosis> DiagnoseTouches(const PhotographEffects& photo
     TOUCHSTONE_ASSIGN_OR_RETURN(initial, workspace->predictor->Run(*input.initial_model, true, true));
   }
   diagnosis.residuals = DescribeBoth(*workspace, initial, touches::Residuals(o, initial), ladder.prediction,
-                                     ladder.residuals, ladder.noise_floor.sigma_s);
+                                     ladder.residuals, ladder.noise_floor.sigma);
   AddSentences(&diagnosis);
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
   if (touches_needed > 0) {
@@ -264,7 +237,7 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& given, const Dia
   AddHowWrong(*workspace, residuals, &diagnosis);
   if (diagnosis.data.touches > 0)
     diagnosis.residuals = DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,
-                                       residuals, diagnosis.noise_floor->sigma_s);
+                                       residuals, diagnosis.noise_floor->sigma);
   photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);
   diagnosis.duration_s = Now() - began;

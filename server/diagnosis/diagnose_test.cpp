@@ -27,15 +27,15 @@ report::Diagnosis DiagnoseRig(const touches::HiddenRig& rig) {
 
 std::vector<std::string> StepNames(const report::Diagnosis& report) {
   std::vector<std::string> names;
-  for (const selection::LadderStep& step : report.steps) names.push_back(step.effect);
+  for (const engine::LadderStep& step : report.steps) names.push_back(step.effect);
   return names;
 }
 
 TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
   const report::Diagnosis report = DiagnoseRig({});
-  EXPECT_EQ(report.verdict, selection::Verdict::kAdequate) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kAdequate) << report.summary;
   EXPECT_EQ(report.steps.size(), 0u);
-  EXPECT_NEAR(report.noise_floor->sigma_s, 2000e-6, 150e-6);
+  EXPECT_NEAR(report.noise_floor->sigma, 2000e-6, 150e-6);
   EXPECT_GT(report.initial->lack_of_fit_p, 0.001);
   EXPECT_TRUE(report.improved_model_yaml.empty());
 }
@@ -55,7 +55,7 @@ TEST(Diagnose, SaysThatAFewTouchesAreTooLittleAndHowManyWouldDo) {
   for (const int count : {1, 6, 15}) {
     const absl::StatusOr<report::Diagnosis> report = Diagnose(FirstTouches(count, rig), {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData) << count;
+    EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData) << count;
     // 31 contrasts are 16 touches, and more where fingers stay silent.
     EXPECT_GE(report->touches_needed, 16) << count;
     EXPECT_LE(report->touches_needed, 20) << count;
@@ -65,7 +65,7 @@ TEST(Diagnose, SaysThatAFewTouchesAreTooLittleAndHowManyWouldDo) {
   }
   const absl::StatusOr<report::Diagnosis> enough = Diagnose(FirstTouches(24, rig), {});
   ASSERT_TRUE(enough.ok());
-  EXPECT_NE(enough->verdict, selection::Verdict::kTooLittleData);
+  EXPECT_NE(enough->verdict, engine::Verdict::kTooLittleData);
 }
 
 TEST(Diagnose, NeverCallsAModelGoodThatNoTouchWasComparedWith) {
@@ -76,7 +76,7 @@ TEST(Diagnose, NeverCallsAModelGoodThatNoTouchWasComparedWith) {
   input.set = set;
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData);
+  EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData);
   EXPECT_EQ(report->data.touches, 0);
   EXPECT_EQ(report->touches_needed, 16);
 }
@@ -88,7 +88,7 @@ TEST(Diagnose, ChecksTheFileBeforeThePhysics) {
   input.set = set;
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, selection::Verdict::kCheckData);
+  EXPECT_EQ(report->verdict, engine::Verdict::kCheckData);
   ASSERT_FALSE(report->data_problems.empty());
   EXPECT_EQ(report->data_problems[0].kind, "units_time");
   EXPECT_TRUE(report->steps.empty());
@@ -100,7 +100,7 @@ TEST(Propose, StillProposesWhereThereIsTooLittleForAVerdict) {
   rig.hidden = {{"tip_radius", {"radius_mm=3"}}};
   const absl::StatusOr<report::Diagnosis> report = Propose(FirstTouches(8, rig), 4, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, selection::Verdict::kTooLittleData);
+  EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData);
   // Touches, or the reason why there are none.
   EXPECT_TRUE(!report->next_touches.empty() ||
               std::any_of(report->warnings.begin(), report->warnings.end(), [](const std::string& warning) {
@@ -113,13 +113,13 @@ TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(report.verdict, engine::Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"tip_radius"});
-  const inference::ParameterEstimate& radius = report.steps[0].parameters[0];
+  const engine::ParameterEstimate& radius = report.steps[0].parameters[0];
   EXPECT_NEAR(radius.value, 1.5, 4 * radius.std_error);
   EXPECT_LT(radius.std_error, 0.05);
-  EXPECT_LT(report.final->rmse_s, 1.06 * report.noise_floor->sigma_s);
-  EXPECT_GT(report.initial->rmse_s, 3 * report.noise_floor->sigma_s);
+  EXPECT_LT(report.final->rmse, 1.06 * report.noise_floor->sigma);
+  EXPECT_GT(report.initial->rmse, 3 * report.noise_floor->sigma);
   // The improved model is a file that holds the effect.
   const absl::StatusOr<model::Model> better =
       model::ParseModel(report.improved_model_yaml, "better", effects::Catalogue());
@@ -175,7 +175,7 @@ TEST(Diagnose, SaysThatAValueOfTheModelIsWrong) {
   rig.hidden = {{"tip_radius", {"radius_mm=2"}}};
   rig.known = {{"tip_radius", {"radius_mm=1"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, selection::Verdict::kWrongValues) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kWrongValues) << report.summary;
   ASSERT_EQ(report.refitted.size(), 1u);
   EXPECT_EQ(report.refitted[0].effect, "tip_radius");
   EXPECT_NEAR(report.refitted[0].parameters[0].value, 2, 0.1);
@@ -189,7 +189,7 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
                  {"name=odd", "adds=travel_mm", "expression=k*(finger==0)*approach_z", "k=0.4", "k_unit=mm",
                   "k_min=-1", "k_max=1"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, selection::Verdict::kUnexplained) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kUnexplained) << report.summary;
   ASSERT_GE(report.unexplained->covariates.size(), 1u);
   EXPECT_EQ(report.unexplained->covariates[0].name, "approach_z");
   EXPECT_THAT(report.unexplained->formula, HasSubstr("approach_z"));
@@ -214,7 +214,7 @@ TEST(Diagnose, LetsAFormulaOfTheUserCompete) {
   input.also = {mine.effects[0].effect};
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(report->verdict, engine::Verdict::kMissingEffects);
   ASSERT_EQ(StepNames(*report), std::vector<std::string>{"formula mine"});
   EXPECT_NEAR(report->steps[0].parameters[0].value, 0.4, 0.05);
 }
@@ -255,7 +255,7 @@ TEST(Diagnose, SaysThatNoiseOfTheModelIsNotThere) {
   rig.samples_per_face = 8;
   rig.known = {{"poll_interval", {"interval_us=8000"}}, {"heavy_tail_noise", {"degrees_of_freedom=3"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, selection::Verdict::kWrongValues) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kWrongValues) << report.summary;
   EXPECT_THAT(report.superfluous, testing::UnorderedElementsAre("poll_interval", "heavy_tail_noise"));
   EXPECT_THAT(report.improved_model_yaml, testing::Not(HasSubstr("poll_interval")));
   EXPECT_THAT(report.improved_model_yaml, HasSubstr("gaussian_noise"));
@@ -288,9 +288,8 @@ TEST(Diagnose, ALoudFingerIsNoHeavyTail) {
 // The factor by which the model's sigma is off, and the verdict.
 TEST(Diagnose, ASigmaThatIsOffByAFactorIsAWrongValueAndOneThatIsNearIsEstimatedAnew) {
   for (const auto& [declared_us, verdict] :
-       {std::pair(900.0, selection::Verdict::kWrongValues), std::pair(1500.0, selection::Verdict::kAdequate),
-        std::pair(2700.0, selection::Verdict::kAdequate),
-        std::pair(6000.0, selection::Verdict::kWrongValues)}) {
+       {std::pair(900.0, engine::Verdict::kWrongValues), std::pair(1500.0, engine::Verdict::kAdequate),
+        std::pair(2700.0, engine::Verdict::kAdequate), std::pair(6000.0, engine::Verdict::kWrongValues)}) {
     DiagnosisInput input = touches::MakeTestInput({});
     input.model = std::make_shared<const model::Model>(touches::WithEffects(
         model::NominalModel(), {{"gaussian_noise", {absl::StrCat("sigma_us=", declared_us)}}}));
@@ -369,7 +368,7 @@ TEST(Diagnose, NamesAMeshInAnotherUnitThatACompareRefuses) {
     EXPECT_THAT(std::string(status.message()), HasSubstr("object 'lat10'"));
     const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict, selection::Verdict::kCheckData) << scale;
+    EXPECT_EQ(report->verdict, engine::Verdict::kCheckData) << scale;
     ASSERT_EQ(report->data_problems.size(), 1u);
     EXPECT_EQ(report->data_problems[0].kind, "units_length");
     EXPECT_THAT(report->data_problems[0].detail, HasSubstr("lat10"));
@@ -388,8 +387,7 @@ TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
     input.set = set;
     const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict,
-              touches < 16 ? selection::Verdict::kTooLittleData : selection::Verdict::kAdequate)
+    EXPECT_EQ(report->verdict, touches < 16 ? engine::Verdict::kTooLittleData : engine::Verdict::kAdequate)
         << touches << ": " << report->summary;
     EXPECT_GE(report->warnings.size(), 1u);
   }
@@ -436,8 +434,8 @@ TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
   rig.hidden = {{"finger_length", {"offset_mm=0.4,-0.2,-0.2"}}};
   const absl::StatusOr<report::Diagnosis> report = Compare(touches::MakeTestInput(rig), {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->verdict, selection::Verdict::kNone);
-  EXPECT_NEAR(report->noise_floor->sigma_s, 2000e-6, 200e-6);
+  EXPECT_EQ(report->verdict, engine::Verdict::kNone);
+  EXPECT_NEAR(report->noise_floor->sigma, 2000e-6, 200e-6);
   EXPECT_GT(report->reducible_share, 0.9);
   ASSERT_GE(report->residuals.slices.size(), 1u);
   EXPECT_EQ(report->residuals.slices[0].conditions, "finger = l");
@@ -448,7 +446,7 @@ double ComparedRmse(DiagnosisInput input, const model::Model& model) {
   input.model = std::make_shared<const model::Model>(model);
   const absl::StatusOr<report::Diagnosis> compared = Compare(input, {});
   EXPECT_TRUE(compared.ok()) << compared.status();
-  return compared.ok() && compared->initial ? compared->initial->rmse_s : NAN;
+  return compared.ok() && compared->initial ? compared->initial->rmse : NAN;
 }
 
 // Every error of the ladder against what a comparison with that step's model finds.
@@ -456,16 +454,16 @@ void ExpectErrorsAsCompared(const touches::HiddenRig& rig) {
   const DiagnosisInput input = touches::MakeTestInput(rig);
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_NEAR(report->initial->rmse_s / ComparedRmse(input, *input.model), 1, 0.01);
-  for (const selection::LadderStep& step : report->steps) {
+  EXPECT_NEAR(report->initial->rmse / ComparedRmse(input, *input.model), 1, 0.01);
+  for (const engine::LadderStep& step : report->steps) {
     if (step.model.effects.empty()) continue;  // noise: it changes no expectation
-    EXPECT_NEAR(step.quality.rmse_s / ComparedRmse(input, step.model), 1, 0.01) << step.effect;
+    EXPECT_NEAR(step.quality.rmse / ComparedRmse(input, step.model), 1, 0.01) << step.effect;
   }
   if (report->improved_model_yaml.empty()) return;
   const absl::StatusOr<model::Model> better =
       model::ParseModel(report->improved_model_yaml, "better", effects::Catalogue());
   ASSERT_TRUE(better.ok()) << better.status();
-  EXPECT_NEAR(report->final->rmse_s / ComparedRmse(input, *better), 1, 0.01);
+  EXPECT_NEAR(report->final->rmse / ComparedRmse(input, *better), 1, 0.01);
 }
 
 TEST(Diagnose, FindsTheErrorsThatAComparisonFinds) {
@@ -483,9 +481,9 @@ TEST(Diagnose, ClaimsNoFallForASurfaceErrorThatNobodyKnows) {
   rig.hidden = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"surface_error"}) << report.summary;
-  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects);
-  EXPECT_EQ(report.steps[0].quality.rmse_s, report.initial->rmse_s);
-  EXPECT_EQ(report.final->rmse_s, report.initial->rmse_s);
+  EXPECT_EQ(report.verdict, engine::Verdict::kMissingEffects);
+  EXPECT_EQ(report.steps[0].quality.rmse, report.initial->rmse);
+  EXPECT_EQ(report.final->rmse, report.initial->rmse);
   EXPECT_THAT(report.steps[0].words, HasSubstr("at poses left out"));
 }
 
@@ -495,7 +493,7 @@ TEST(Diagnose, ExplainsItsOwnModelWithASurfaceError) {
   rig.hidden = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
   rig.known = {{"surface_error", {"rms_mm=0.2", "length_mm=40"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  EXPECT_EQ(report.verdict, selection::Verdict::kAdequate) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kAdequate) << report.summary;
 }
 
 TEST(Diagnose, AsksForALookAtTheSetUpWhereAValueIsLargerThanRigsShow) {
@@ -516,7 +514,7 @@ TEST(Diagnose, NamesTheOldValueBesideANewEffect) {
   rig.hidden = {{"finger_length", {"offset_mm=0.3,0,-0.3"}}};
   rig.known = {{"finger_length", {"offset_mm=0.01,0,-0.01"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  if (report.verdict == selection::Verdict::kWrongValues) return;  // the old value alone
+  if (report.verdict == engine::Verdict::kWrongValues) return;  // the old value alone
   ASSERT_GE(report.steps.size(), 1u) << report.summary;
   EXPECT_THAT(report.steps[0].equivalent, Contains("given:finger_length")) << report.summary;
 }
@@ -528,17 +526,16 @@ TEST(Diagnose, CallsAnEffectSuperfluousAndTakesItOut) {
   EXPECT_THAT(report.superfluous, Contains("object_push")) << report.summary;
   EXPECT_TRUE(report.refitted.empty()) << report.summary;
   EXPECT_THAT(report.improved_model_yaml, ::testing::Not(HasSubstr("object_push")));
-  EXPECT_NEAR(report.final->rmse_s, report.noise_floor->sigma_s, 0.1 * report.noise_floor->sigma_s);
+  EXPECT_NEAR(report.final->rmse, report.noise_floor->sigma, 0.1 * report.noise_floor->sigma);
 }
 
 TEST(Diagnose, IsNeverCertain) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  for (const selection::LadderStep& step : report.steps)
-    EXPECT_LE(step.probability, selection::kMaxProbability);
-  for (const selection::RankedCandidate& candidate : report.candidates)
-    EXPECT_LE(candidate.probability, selection::kMaxProbability);
+  for (const engine::LadderStep& step : report.steps) EXPECT_LE(step.probability, engine::kMaxProbability);
+  for (const engine::RankedCandidate& candidate : report.candidates)
+    EXPECT_LE(candidate.probability, engine::kMaxProbability);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ report::Diagnosis ReportOf(const selection::Workspace& workspace) {
 }  // namespace
 
 report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
-                                  std::vector<selection::DataProblem> problems) {
+                                  std::vector<engine::DataProblem> problems) {
   report::Diagnosis diagnosis;
   const auto workspace = selection::MakeWorkspace(input, context);
   if (workspace.ok()) {
@@ -39,10 +39,10 @@ report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisCo
     diagnosis.model_name = input.model->name;
     diagnosis.model_hash = input.model->Hash();
     if (const auto o = touches::MakeObservations(input); o.ok()) diagnosis.data = touches::SummarizeData(*o);
-    const double before_s = problems.empty() ? NAN : problems[0].rmse_before_s;
-    if (before_s > 0) diagnosis.initial = diagnosis.final = selection::Quality{before_s, before_s, 0};
+    const double before_s = problems.empty() ? NAN : problems[0].error_before;
+    if (before_s > 0) diagnosis.initial = diagnosis.final = engine::Quality{before_s, before_s, 0};
   }
-  diagnosis.verdict = selection::Verdict::kCheckData;
+  diagnosis.verdict = engine::Verdict::kCheckData;
   diagnosis.data_problems = std::move(problems);
   diagnosis.summary = report::Summarize(diagnosis);
   return diagnosis;
@@ -72,7 +72,7 @@ int TouchesNeeded(const touches::Observations& o) {
 
 report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int touches_needed) {
   report::Diagnosis diagnosis = ReportOf(workspace);
-  diagnosis.verdict = selection::Verdict::kTooLittleData;
+  diagnosis.verdict = engine::Verdict::kTooLittleData;
   diagnosis.touches_needed = touches_needed;
   for (std::string& warning : report::DataWarnings(diagnosis.data))
     diagnosis.warnings.push_back(std::move(warning));

@@ -16,8 +16,8 @@ report::Diagnosis BeginDiagnosis(const selection::Workspace& workspace) {
   return diagnosis;
 }
 
-double ReducibleShare(const selection::NoiseFloor& floor, const selection::Quality& quality) {
-  const double noise_s2 = floor.sigma_s * floor.sigma_s, error_s2 = quality.rmse_s * quality.rmse_s;
+double ReducibleShare(const engine::NoiseFloor& floor, const engine::Quality& quality) {
+  const double noise_s2 = floor.sigma * floor.sigma, error_s2 = quality.rmse * quality.rmse;
   return error_s2 > 0 ? std::clamp(1 - noise_s2 / error_s2, 0.0, 1.0) : 0;
 }
 

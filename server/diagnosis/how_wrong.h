@@ -10,7 +10,7 @@ namespace touchstone::diagnosis {
 report::Diagnosis BeginDiagnosis(const selection::Workspace& workspace);
 
 // The share of the squared error that is the model's, not noise: 0 to 1.
-double ReducibleShare(const selection::NoiseFloor& floor, const selection::Quality& quality);
+double ReducibleShare(const engine::NoiseFloor& floor, const engine::Quality& quality);
 
 // Error, noise floor and lack of fit of the model as it was given. Nothing without a touch that can be used.
 void AddHowWrong(const selection::Workspace& workspace, const std::vector<double>& residuals,

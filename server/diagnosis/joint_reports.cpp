@@ -9,21 +9,23 @@
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
-#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/photograph_modality.h"
+#include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/report/photograph_summary.h"
 #include "server/diagnosis/report/write_joint_report.h"
 #include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/diagnosis/selection/touch_modality.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {
 namespace {
 
-// The model without effects of photographs, or with nothing else.
-model::Model PartOf(const model::Model& model, bool of_photographs) {
+// The model with the effects of photographs alone.
+model::Model PhotographPartOf(const model::Model& model) {
   model::Model part = model;
   part.effects.clear();
   for (const model::EffectInstance& instance : model.effects)
-    if (instance.effect->of_photos() == of_photographs) part.effects.push_back(instance);
+    if (instance.effect->of_photos()) part.effects.push_back(instance);
   return part;
 }
 
@@ -42,7 +44,7 @@ class JointDiagnoser {
   JointDiagnoser(const DiagnosisInput& input, const DiagnosisContext& context)
       : input_(input), context_(context), touches_(input), photographs_(input) {
     touches_.images = nullptr;
-    touches_.model = std::make_shared<const model::Model>(PartOf(*input.model, false));
+    touches_.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
     photographs_.set = nullptr;
   }
 
@@ -53,7 +55,7 @@ class JointDiagnoser {
                        ": touches without poses cannot be diagnosed together with photographs; take "
                        "touches.csv out of the folder and "
                        "diagnose it by itself"));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::DataProblem> problems,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::DataProblem> problems,
                                 checks::FindDataProblems(touches_, Stretch(context_, 0, 0.05)));
     d_.model_name = input_.model->name;
     d_.model_hash = input_.model->Hash();
@@ -61,17 +63,16 @@ class JointDiagnoser {
     if (!problems.empty()) return CheckTouches(problems);
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool enough, IsEnoughForBoth());
     d_.shared.in_place = *input_.model;
+    d_.shared.heldout.resize(2);
     if (enough) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          d_.shared, joint::FindSharedEffects(touches_, photographs_, Stretch(context_, 0.05, 0.5)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(d_.shared, FindShared());
     }
     if (!d_.shared.conflicts.empty()) return Contradict();
     for (const joint::SharedStep& step : d_.shared.steps) {
       report::JointQuality quality;
       TOUCHSTONE_RETURN_IF_ERROR(Measure(step.model, &quality));
-      quality.touches.heldout_rmse_s *= d_.shared.heldout_ratio;
-      quality.photographs.heldout_rmse_grey =
-          std::sqrt(std::pow(quality.photographs.heldout_rmse_grey, 2) + d_.shared.heldout_excess_grey2);
+      quality.touches.heldout_rmse = d_.shared.heldout[0].Of(quality.touches.heldout_rmse);
+      quality.photographs.heldout_rmse = d_.shared.heldout[1].Of(quality.photographs.heldout_rmse);
       d_.shared_quality.push_back(quality);
     }
     TOUCHSTONE_RETURN_IF_ERROR(DiagnoseEach());
@@ -87,16 +88,24 @@ class JointDiagnoser {
     quiet.progress = [this](const std::string&, double) {
       return !context_.progress || context_.progress("comparing", 0);
     };
-    DiagnosisInput touches = touches_;
-    touches.model = std::make_shared<const model::Model>(PartOf(model, false));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis compared, Compare(touches, quiet));
-    if (compared.initial) quality->touches = *compared.initial;
+    TOUCHSTONE_ASSIGN_OR_RETURN(quality->touches, selection::CompareTouches(touches_, model, quiet));
     DiagnosisInput photographs = photographs_;
     photographs.model = std::make_shared<const model::Model>(model);
     TOUCHSTONE_ASSIGN_OR_RETURN(const images::PhotographDiagnosis pictures,
                                 images::ComparePhotographs(photographs, quiet));
     if (pictures.initial) quality->photographs = *pictures.initial;
     return absl::OkStatus();
+  }
+
+  absl::StatusOr<joint::SharedEffects> FindShared() const {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches,
+                                selection::TouchModality::Make(touches_, Stretch(context_, 0.05, 0.15)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto photographs, images::PhotographModality::Make(
+                                                            photographs_, Stretch(context_, 0.15, 0.25)));
+    const DiagnosisContext both = Stretch(context_, 0.25, 0.5);
+    return joint::FindSharedEffects({touches.get(), photographs.get()}, *input_.model, [&](double done) {
+      return !both.progress || both.progress("fitting both together", done);
+    });
   }
 
   absl::StatusOr<bool> IsEnoughForBoth() const {
@@ -122,7 +131,7 @@ class JointDiagnoser {
   }
 
   // A mistake of the touches' file: the photographs beside it are compared.
-  absl::StatusOr<v1::Report> CheckTouches(const std::vector<selection::DataProblem>& problems) {
+  absl::StatusOr<v1::Report> CheckTouches(const std::vector<engine::DataProblem>& problems) {
     d_.touches = CheckDataReport(touches_, Stretch(context_, 0.5, 0.6), problems);
     TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
     return report::ToJointReport(d_, *input_.images);
@@ -139,7 +148,7 @@ class JointDiagnoser {
     DiagnosisInput touches = touches_;
     touches.settled = d_.shared.settled;
     touches.initial_model = touches_.model;
-    touches.model = std::make_shared<const model::Model>(PartOf(d_.shared.in_place, false));
+    touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(d_.shared.in_place));
     TOUCHSTONE_ASSIGN_OR_RETURN(d_.touches, Diagnose(touches, Stretch(context_, 0.5, 0.7)));
     DiagnosisInput photographs = photographs_;
     photographs.settled = d_.shared.settled;
@@ -166,8 +175,8 @@ class JointDiagnoser {
     if (d_.shared.steps.empty() && d_.touches.improved_model_yaml.empty() &&
         d_.photographs.improved_model_yaml.empty())
       return;
-    model::Model both = PartOf(improved(d_.touches.improved_model_yaml), false);
-    const model::Model pictures = PartOf(improved(d_.photographs.improved_model_yaml), true);
+    model::Model both = selection::TouchPartOf(improved(d_.touches.improved_model_yaml));
+    const model::Model pictures = PhotographPartOf(improved(d_.photographs.improved_model_yaml));
     both.effects.insert(both.effects.end(), pictures.effects.begin(), pictures.effects.end());
     both.name = input_.model->name.empty() ? "" : input_.model->name + "_better";
     d_.improved_model_yaml = model::FormatModel(both);

@@ -35,10 +35,10 @@ double GreyErrorOf(const DiagnosisInput& input, ThreadPool* pool) {
 }
 
 // The problem with its errors: the model as it was given, on the set as it is and as it would be.
-images::PhotographDataProblem WithErrors(const checks::PhotoMistake& mistake, const DiagnosisInput& input,
-                                         double before_grey, ThreadPool* pool) {
-  images::PhotographDataProblem problem = mistake.problem;
-  problem.rmse_before_grey = before_grey;
+engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const DiagnosisInput& input,
+                               double before_grey, ThreadPool* pool) {
+  engine::DataProblem problem = mistake.problem;
+  problem.error_before = before_grey;
   DiagnosisInput fixed = input;
   if (mistake.model != nullptr) {
     fixed.model = mistake.model;
@@ -47,10 +47,10 @@ images::PhotographDataProblem WithErrors(const checks::PhotoMistake& mistake, co
     if (!session::ApplyFix(mistake.fix, set.get()).ok()) return problem;
     fixed.images = set;
   }
-  problem.rmse_after_grey = GreyErrorOf(fixed, pool);
-  if (std::abs(problem.rmse_after_grey - before_grey) > 1e-9)
+  problem.error_after = GreyErrorOf(fixed, pool);
+  if (std::abs(problem.error_after - before_grey) > 1e-9)
     problem.words += absl::StrFormat(" The model as it is would be off by %.3g grey levels instead of %.3g.",
-                                     problem.rmse_after_grey, before_grey);
+                                     problem.error_after, before_grey);
   return problem;
 }
 
@@ -92,10 +92,10 @@ absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
   const auto engine = [&](images::Expectation* expectation) -> absl::StatusOr<images::PhotographDiagnosis> {
     TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
                                 images::ComparePhotographs(input, context, expectation));
-    diagnosis.verdict = selection::Verdict::kCheckData;
+    diagnosis.verdict = engine::Verdict::kCheckData;
     for (const checks::PhotoMistake& mistake : mistakes)
       diagnosis.data_problems.push_back(
-          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse_grey : NAN, context.pool));
+          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse : NAN, context.pool));
     return diagnosis;
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, Reported(input, context, engine));
@@ -111,7 +111,7 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
   TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
                               images::DiagnosePhotographs(input, context, expectation));
   const images::ExplanationsLeft& left = expectation->left;
-  if (diagnosis.verdict == selection::Verdict::kTooLittleData) {
+  if (diagnosis.verdict == engine::Verdict::kTooLittleData) {
     const int missing = std::max(diagnosis.images_needed - expectation->photographs.poses, 1);
     diagnosis.next_photographs =
         design::PhotographsToBegin(expectation->photographs, always ? max_photographs : missing, input.seed);
@@ -128,7 +128,7 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
     diagnosis.warnings.push_back("No picture would tell more than those at hand.");
     return diagnosis;
   }
-  const std::string other = selection::DiscriminatingMeasurement({left.models[0].name, left.models[1].name});
+  const std::string other = engine::DiscriminatingMeasurement({left.models[0].name, left.models[1].name});
   diagnosis.warnings.push_back(absl::StrCat("No picture of this camera tells ", left.models[0].name, " from ",
                                             left.models[1].name, other.empty() ? "." : ": ", other));
   return diagnosis;

@@ -36,7 +36,7 @@ double ComparedRmse(const touches::HiddenRig& rig, const std::string& model_yaml
   input.model = std::make_shared<const model::Model>(*model);
   const absl::StatusOr<report::Diagnosis> report = Compare(input, {});
   EXPECT_TRUE(report.ok()) << report.status();
-  return report.ok() ? report->initial->rmse_s : NAN;
+  return report.ok() ? report->initial->rmse : NAN;
 }
 
 TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
@@ -44,18 +44,17 @@ TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
   const report::Diagnosis report = DiagnoseWithMap(touches::MakeTestInput(rig));
   ASSERT_EQ(report.steps.size(), 1u) << report.summary;
   EXPECT_EQ(report.steps[0].effect, "surface_map");
-  EXPECT_EQ(report.verdict, selection::Verdict::kMissingEffects) << report.summary;
+  EXPECT_EQ(report.verdict, engine::Verdict::kMissingEffects) << report.summary;
   // On the same touches: what the report gives as the error.
-  EXPECT_NEAR(ComparedRmse(rig, report.improved_model_yaml), report.final->rmse_s,
-              0.01 * report.final->rmse_s);
+  EXPECT_NEAR(ComparedRmse(rig, report.improved_model_yaml), report.final->rmse, 0.01 * report.final->rmse);
   // On other touches of the same objects: what it gives as the error on unseen ones, and not what the same touches have.
   touches::HiddenRig others = rig;
   others.pose_seed = 77;
   const double unseen_s = ComparedRmse(others, report.improved_model_yaml);
   // Steep touches, of which each set has others, weigh most.
-  EXPECT_LT(unseen_s, 1.5 * report.final->heldout_rmse_s);
-  EXPECT_GT(unseen_s, report.final->heldout_rmse_s / 1.5);
-  EXPECT_GT(unseen_s, 1.2 * report.final->rmse_s);
+  EXPECT_LT(unseen_s, 1.5 * report.final->heldout_rmse);
+  EXPECT_GT(unseen_s, report.final->heldout_rmse / 1.5);
+  EXPECT_GT(unseen_s, 1.2 * report.final->rmse);
   EXPECT_LT(unseen_s, 0.6 * ComparedRmse(others, model::FormatModel(*touches::MakeTestInput(rig).model)));
 }
 
@@ -64,7 +63,7 @@ TEST(SurfaceMapOfADiagnosis, IsClaimedOnlyWhereItIsAskedFor) {
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->steps.size(), 1u) << report->summary;
   EXPECT_EQ(report->steps[0].effect, "surface_error");
-  EXPECT_EQ(report->final->rmse_s, report->initial->rmse_s);
+  EXPECT_EQ(report->final->rmse, report->initial->rmse);
 }
 
 TEST(SurfaceMapOfADiagnosis, KnowsTheSurfaceWithinItsStandardDeviation) {
@@ -108,7 +107,7 @@ TEST(SurfaceMapOfADiagnosis, LeavesNothingToFindOnItsOwnTouches) {
   input.model = std::make_shared<const model::Model>(
       *model::ParseModel(report.improved_model_yaml, "improved.yaml", effects::Catalogue()));
   const report::Diagnosis again = DiagnoseWithMap(input);
-  EXPECT_EQ(again.verdict, selection::Verdict::kAdequate) << again.summary;
+  EXPECT_EQ(again.verdict, engine::Verdict::kAdequate) << again.summary;
 }
 
 }  // namespace

@@ -92,11 +92,11 @@ LensVector ResampledErrors(const BoardSet& set, const LensChoice& choice, uint64
   return ((squares / count - mean.cwiseProduct(mean)).cwiseMax(0) * count / (count - 1.0)).cwiseSqrt();
 }
 
-std::vector<inference::ParameterEstimate> Estimates(const LensTerm& term, const LensVector& lens,
-                                                    const LensVector& errors, double t) {
-  std::vector<inference::ParameterEstimate> estimates;
+std::vector<engine::ParameterEstimate> Estimates(const LensTerm& term, const LensVector& lens,
+                                                 const LensVector& errors, double t) {
+  std::vector<engine::ParameterEstimate> estimates;
   for (const int entry : term.entries) {
-    inference::ParameterEstimate estimate;
+    engine::ParameterEstimate estimate;
     const EntryName name = NameOf(entry);
     estimate.name = name.parameter;
     estimate.entry = name.axis;
@@ -123,7 +123,7 @@ void Weigh(const BoardSet& set, const LensChoice& last, int term, BoardStep* ste
     if (less < kMinGainNats && LensTerms()[other].named) step->equivalent.push_back(LensTerms()[other].name);
     rivals += std::exp(-less);
   }
-  step->probability = std::min(selection::kMaxProbability, 1 / (1 + rivals));
+  step->probability = std::min(engine::kMaxProbability, 1 / (1 + rivals));
 }
 
 // What no effect of the catalogue has and left-out pictures are predicted better with, one after the other.
@@ -157,7 +157,7 @@ std::vector<BoardRest> FindRest(const BoardSet& set, LensChoice now, const LensC
 // "k1=-0.2843,k2=0.05" as AddEffect takes it.
 std::vector<std::string> Assignments(const BoardStep& step) {
   std::vector<std::string> assignments;
-  for (const inference::ParameterEstimate& estimate : step.parameters) {
+  for (const engine::ParameterEstimate& estimate : step.parameters) {
     const std::string value = ShortestNumber(estimate.value);
     if (estimate.entry == "y")
       assignments.back() += absl::StrCat(",", value);
@@ -183,7 +183,7 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
     return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse_px,
                            quality.heldout_rmse_px);
   };
-  if (diagnosis.verdict == selection::Verdict::kTooLittleData)
+  if (diagnosis.verdict == engine::Verdict::kTooLittleData)
     return absl::StrFormat(
         "The board was found in %d pictures; %d are needed, from different sides.%s", diagnosis.pictures,
         diagnosis.pictures_needed,
@@ -197,7 +197,7 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
                       diagnosis.corners, diagnosis.pictures, error(*diagnosis.initial),
                       set.camera_is_guess ? ", which is a guess (no camera.yaml)" : "");
   for (const BoardStep& step : diagnosis.steps) {
-    const auto value = [](const inference::ParameterEstimate& p) {
+    const auto value = [](const engine::ParameterEstimate& p) {
       return absl::StrFormat("%s%s%s %.5g +- %.2g", p.name, p.entry.empty() ? "" : " ", p.entry, p.value,
                              p.std_error);
     };
@@ -268,7 +268,7 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
                                               " inner corners was found in ",
                                               absl::StrJoin(set.without_board, ", ")));
   if (diagnosis.pictures < kMinBoardPictures) {
-    diagnosis.verdict = selection::Verdict::kTooLittleData;
+    diagnosis.verdict = engine::Verdict::kTooLittleData;
     diagnosis.pictures_needed = kMinBoardPictures;
     diagnosis.summary = Summary(set, diagnosis);
     return diagnosis;
@@ -284,9 +284,9 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   diagnosis.lens = search.ladder.back().fit.lens;
   AddSteps(through_model, search, fullest, seed, &diagnosis);
   diagnosis.rest = FindRest(through_model, search.ladder.back(), fullest);
-  diagnosis.verdict = !diagnosis.rest.empty()    ? selection::Verdict::kUnexplained
-                      : !diagnosis.steps.empty() ? selection::Verdict::kMissingEffects
-                                                 : selection::Verdict::kAdequate;
+  diagnosis.verdict = !diagnosis.rest.empty()    ? engine::Verdict::kUnexplained
+                      : !diagnosis.steps.empty() ? engine::Verdict::kMissingEffects
+                                                 : engine::Verdict::kAdequate;
   if (!diagnosis.steps.empty()) TOUCHSTONE_RETURN_IF_ERROR(ImproveModel(model, &diagnosis));
   diagnosis.summary = Summary(set, diagnosis);
   diagnosis.duration_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

@@ -15,8 +15,8 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_fit.h"
-#include "server/diagnosis/inference/parameter_estimate.h"
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/parameter_estimate.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::boards {
@@ -42,8 +42,8 @@ struct BoardStep {
   std::string effect;
   std::vector<std::string> equivalent;  // that these pictures cannot tell from it
   double probability = 0, gain_nats = 0;
-  std::vector<inference::ParameterEstimate> parameters;  // standard errors from resampled pictures
-  BoardQuality quality;                                  // with this step and all earlier ones, fitted anew
+  std::vector<engine::ParameterEstimate> parameters;  // standard errors from resampled pictures
+  BoardQuality quality;                               // with this step and all earlier ones, fitted anew
   std::string meaning, check_on_rig, remedy;
 };
 
@@ -56,7 +56,7 @@ struct BoardRest {
 };
 
 struct BoardDiagnosis {
-  selection::Verdict verdict = selection::Verdict::kNone;
+  engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
   int pictures = 0, corners = 0;               // that took part; corners of all pictures
   std::optional<BoardQuality> initial, final;  // none with kTooLittleData

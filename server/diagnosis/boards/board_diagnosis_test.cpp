@@ -13,7 +13,7 @@
 namespace touchstone::diagnosis::boards {
 namespace {
 
-using selection::Verdict;
+using engine::Verdict;
 using ::testing::HasSubstr;
 using ::testing::UnorderedElementsAre;
 
@@ -30,10 +30,10 @@ std::vector<std::string> Named(const BoardDiagnosis& diagnosis) {
   return names;
 }
 
-const inference::ParameterEstimate* Find(const BoardDiagnosis& diagnosis, const std::string& parameter,
-                                         const std::string& axis = "") {
+const engine::ParameterEstimate* Find(const BoardDiagnosis& diagnosis, const std::string& parameter,
+                                      const std::string& axis = "") {
   for (const BoardStep& step : diagnosis.steps)
-    for (const inference::ParameterEstimate& estimate : step.parameters)
+    for (const engine::ParameterEstimate& estimate : step.parameters)
       if (estimate.name == parameter && estimate.entry == axis) return &estimate;
   return nullptr;
 }
@@ -72,7 +72,7 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
   const BoardSet set = MakeBoardSet(lens, 14, 0.2, 8);
   const BoardDiagnosis diagnosis = Diagnosed(set);
   EXPECT_THAT(Named(diagnosis), UnorderedElementsAre("focal_error", "principal_point", "radial_distortion"));
-  const std::pair<const inference::ParameterEstimate*, double> found[] = {
+  const std::pair<const engine::ParameterEstimate*, double> found[] = {
       {Find(diagnosis, "relative"), -0.1},
       {Find(diagnosis, "offset_px", "x"), 12},
       {Find(diagnosis, "offset_px", "y"), -7},
@@ -101,7 +101,7 @@ TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {
     const BoardDiagnosis diagnosis =
         Diagnosed(MakeBoardSet(LensWith({{kK1, -0.2}, {kK2, 0.05}}), 20, 0.2, 200 + seed));
     for (const auto& [name, truth] : {std::pair("k1", -0.2), std::pair("k2", 0.05)}) {
-      const inference::ParameterEstimate* estimate = Find(diagnosis, name);
+      const engine::ParameterEstimate* estimate = Find(diagnosis, name);
       ASSERT_NE(estimate, nullptr);
       covered += estimate->lower <= truth && truth <= estimate->upper;
       ++count;

@@ -95,7 +95,7 @@ class ProblemList {
   void AddDuplicates(const touches::Observations& o);
   void AddSortedColumn(const TrialResult& before);
 
-  std::vector<selection::DataProblem> Take() { return std::move(problems_); }
+  std::vector<engine::DataProblem> Take() { return std::move(problems_); }
 
  private:
   // Two fixes that have no field in common.
@@ -117,19 +117,19 @@ class ProblemList {
   }
   void Add(const Mistake& mistake, const session::MeasurementFix& fix, const std::string& sentence,
            const DiagnosisInput& input, const std::string& output) {
-    selection::DataProblem problem;
+    engine::DataProblem problem;
     problem.kind = mistake.kind;
     problem.detail = mistake.detail;
-    problem.rmse_before_s = BeforeS();
-    problem.rmse_after_s = NAN;
+    problem.error_before = BeforeS();
+    problem.error_after = NAN;
     problem.words = sentence + ".";
     // Touches too scattered to be listed in a command.
     const bool in_part = mistake.part && fix.touches.empty();
     if (!in_part) {
       problem.fix = TouchFixCommand(fix, *input.set, output);
-      problem.rmse_after_s = RmseAfter(input, fix, pool_);
+      problem.error_after = RmseAfter(input, fix, pool_);
       absl::StrAppend(&problem.words, " With that fixed, the model as it is would be off by ",
-                      TimeInWords(problem.rmse_after_s), " instead of ", TimeInWords(BeforeS()), ".");
+                      TimeInWords(problem.error_after), " instead of ", TimeInWords(BeforeS()), ".");
     }
     problems_.push_back(std::move(problem));
   }
@@ -137,7 +137,7 @@ class ProblemList {
   const DiagnosisInput& input_;
   ThreadPool* pool_;
   std::optional<double> before_s_;
-  std::vector<selection::DataProblem> problems_;
+  std::vector<engine::DataProblem> problems_;
 };
 
 // The file is right here, so no command fixes it: the option that names the mesh does.
@@ -260,9 +260,9 @@ absl::Status LookForMistakes(const DiagnosisInput& input, const DiagnosisContext
 
 }  // namespace
 
-absl::StatusOr<std::vector<selection::DataProblem>> FindDataProblems(const DiagnosisInput& input,
-                                                                     const DiagnosisContext& context) {
-  const std::vector<selection::DataProblem> none;
+absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const DiagnosisInput& input,
+                                                                  const DiagnosisContext& context) {
+  const std::vector<engine::DataProblem> none;
   const absl::StatusOr<touches::Observations> o = touches::MakeObservations(input);
   if (!o.ok() || !input.set->has_poses) return none;
   const Trial trial(input, SampleRows(*o));

@@ -20,14 +20,14 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/input.h"
-#include "server/diagnosis/selection/result.h"
 
 namespace touchstone::diagnosis::checks {
 
 // The mistakes that explain the misfit, most telling first; empty: none does, or there are too few touches to say.
 // Never fails because of the data: what contradicts itself is left to the diagnosis that follows. CANCELLED as there.
-absl::StatusOr<std::vector<selection::DataProblem>> FindDataProblems(const DiagnosisInput& input,
-                                                                     const DiagnosisContext& context);
+absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const DiagnosisInput& input,
+                                                                  const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis::checks

@@ -92,12 +92,12 @@ TEST(DataProblems, EveryMistakeIsNamedBesidePhysicsThatIsMissing) {
       const auto problems = ProblemsOf(Spoilt(right, test.spoil));
       EXPECT_FALSE(problems.empty());
       if (problems.empty()) continue;
-      const selection::DataProblem& problem = problems.front();
+      const engine::DataProblem& problem = problems.front();
       EXPECT_EQ(problem.kind, test.kind) << problem.words;
       EXPECT_THAT(problem.detail, ::testing::HasSubstr(test.detail));
       EXPECT_THAT(problem.fix, ::testing::HasSubstr(test.fix));
       EXPECT_THAT(problem.fix, ::testing::StartsWith("touchstone session fix set.csv "));
-      EXPECT_LT(problem.rmse_after_s, 0.03);
+      EXPECT_LT(problem.error_after, 0.03);
     }
   }
 }

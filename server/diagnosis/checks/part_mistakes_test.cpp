@@ -29,7 +29,7 @@ TEST(PartMistakes, FingersExchangedInSomeRoundsAreToldWithTheTouches) {
     EXPECT_THAT(problems[0].fix, HasSubstr("--touches 2"));
     EXPECT_THAT(problems[0].fix, HasSubstr("--swap-fingers l,m"));
     EXPECT_THAT(problems[0].words, HasSubstr(" of the 288 touches alone (touches 2"));
-    EXPECT_LT(problems[0].rmse_after_s, 0.15 * problems[0].rmse_before_s);
+    EXPECT_LT(problems[0].error_after, 0.15 * problems[0].error_before);
   }
 }
 
@@ -46,7 +46,7 @@ TEST(PartMistakes, TouchesOfOneObjectUnderTheNameOfAnotherAreTold) {
     EXPECT_THAT(problems[0].words,
                 HasSubstr(" of the 192 touches that the file calls lat20 were touches of lat10"));
     EXPECT_THAT(problems[0].fix, HasSubstr("--rename-object lat20=lat10"));
-    EXPECT_LT(problems[0].rmse_after_s, 0.15 * problems[0].rmse_before_s);
+    EXPECT_LT(problems[0].error_after, 0.15 * problems[0].error_before);
   }
 }
 
@@ -84,7 +84,7 @@ TEST(PartMistakes, NamesExchangedInOneRoundAreTwoPartsFixedOneAfterTheOther) {
   EXPECT_THAT(problems[1].fix, ::testing::EndsWith("-o fixed2.csv"));
   EXPECT_THAT(problems[0].fix + problems[1].fix, HasSubstr("--touches 120-143 --rename-object lat20=lat10"));
   EXPECT_THAT(problems[0].fix + problems[1].fix, HasSubstr("--touches 216-239 --rename-object lat10=lat20"));
-  EXPECT_LT(problems[1].rmse_after_s, 0.03);
+  EXPECT_LT(problems[1].error_after, 0.03);
 }
 
 TEST(TwoMistakes, BothAreToldWithOneCommand) {
@@ -119,7 +119,7 @@ TEST(TwoMistakes, BothAreToldWithOneCommand) {
     EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(pair.kinds[0], pair.kinds[1])) << problems[0].words;
     EXPECT_EQ(problems[0].fix, problems[1].fix);
     for (const char* option : pair.options) EXPECT_THAT(problems[0].fix, HasSubstr(option));
-    EXPECT_LT(problems[0].rmse_after_s, 0.03);
+    EXPECT_LT(problems[0].error_after, 0.03);
   }
 }
 
@@ -141,7 +141,7 @@ TEST(MeshUnits, AMeshInAnotherUnitIsToldOfTheWholeSetAndOfOneObject) {
       EXPECT_THAT(problems[0].words, HasSubstr(factor == 1e-3 ? "lat20 is in another unit: 1000 times"
                                                : factor < 1   ? "lat20 is in another unit: 25.4 times"
                                                               : "lat20 is in another unit: 1/10 times"));
-      EXPECT_LT(problems[0].rmse_after_s, 0.03);
+      EXPECT_LT(problems[0].error_after, 0.03);
     }
 }
 

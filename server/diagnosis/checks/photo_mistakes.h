@@ -26,7 +26,7 @@ namespace touchstone::diagnosis::checks {
 
 // A mistake that explains the misfit. Errors in grey levels are left 0: who compares knows which pixels take part.
 struct PhotoMistake {
-  images::PhotographDataProblem problem;      // kind, detail and words; fix: of the model's values alone
+  engine::DataProblem problem;                // kind, detail and words; fix: of the model's values alone
   session::ImageSetFix fix;                   // of the set; empty: the model is what is wrong
   std::shared_ptr<const model::Model> model;  // the fixed one; null: the set is what is wrong
   double left_before = 0, left_after = 0;     // the part that is not explained, 0 to 1

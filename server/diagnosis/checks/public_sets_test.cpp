@@ -47,11 +47,11 @@ TEST_F(PublicSets, PermutedFingersAreToldAndTheFixMendsTheFile) {
   const auto problems = FindDataProblems(input, {});
   ASSERT_TRUE(problems.ok()) << problems.status();
   ASSERT_EQ(problems->size(), 1u);
-  const selection::DataProblem& problem = problems->front();
+  const engine::DataProblem& problem = problems->front();
   EXPECT_EQ(problem.kind, "finger_order");
   EXPECT_EQ(problem.detail, "l, m, r hold m, r, l");
   EXPECT_THAT(problem.fix, ::testing::HasSubstr("--finger-order m,r,l -o fixed.csv"));
-  EXPECT_LT(problem.rmse_after_s, 0.02 * problem.rmse_before_s);
+  EXPECT_LT(problem.error_after, 0.02 * problem.error_before);
 }
 
 TEST_F(PublicSets, SwappedObjectsAreTold) {

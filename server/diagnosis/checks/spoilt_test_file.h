@@ -58,10 +58,10 @@ inline DiagnosisInput Spoilt(const DiagnosisInput& input, const MeasurementFix& 
   return Spoilt(input, [&](MeasurementSet* set) { ASSERT_TRUE(session::ApplyFix(fix, set).ok()); });
 }
 
-inline std::vector<selection::DataProblem> ProblemsOf(const DiagnosisInput& input) {
+inline std::vector<engine::DataProblem> ProblemsOf(const DiagnosisInput& input) {
   const auto problems = FindDataProblems(input, {});
   EXPECT_TRUE(problems.ok()) << problems.status();
-  return problems.ok() ? *problems : std::vector<selection::DataProblem>();
+  return problems.ok() ? *problems : std::vector<engine::DataProblem>();
 }
 
 // A fix, set field by field.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/inference/parameterization.h"
+#include "server/diagnosis/engine/parameterization.h"
 #include "server/diagnosis/touches/prediction.h"
 
 namespace touchstone::diagnosis::design {
@@ -26,14 +26,14 @@ Vector Centred(const std::vector<double>& time_s, int k, int fingers, double sig
 // Derivatives of every touch by all free parameters, [touch] fingers x parameters; those that are not finite
 // are 0.
 absl::StatusOr<std::vector<Matrix>> DerivativesOf(const touches::Observations& observations,
-                                                  const inference::Parameterization& free,
+                                                  const engine::Parameterization& free,
                                                   const std::vector<double>& at_start_s, double sigma_s,
                                                   ThreadPool* pool) {
   const int fingers = observations.fingers;
   std::vector<Matrix> columns(observations.size(), Matrix::Zero(fingers, free.size()));
   const Vector start = free.Start();
   for (int c = 0; c < free.size(); ++c) {
-    const inference::FreeParameter& coordinate = free.parameters()[c];
+    const engine::FreeParameter& coordinate = free.parameters()[c];
     double step = kStep * coordinate.scale;
     if (start[c] + step > coordinate.upper) step = -step;
     Vector point = start;
@@ -56,7 +56,7 @@ absl::StatusOr<LinearisedPrediction> Linearise(const model::Model& model,
                                                const touches::Observations& present, double weight,
                                                const touches::Observations& candidates, double sigma_s,
                                                ThreadPool* pool) {
-  inference::Parameterization free(model, present.objects);
+  engine::Parameterization free(model, present.objects);
   for (size_t e = 0; e < model.effects.size(); ++e) free.Free(static_cast<int>(e), true);
   LinearisedPrediction result;
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction now,

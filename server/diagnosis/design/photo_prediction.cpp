@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/parameterization.h"
 #include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/images/photo_rows.h"
-#include "server/diagnosis/inference/parameterization.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
@@ -24,7 +24,7 @@ constexpr double kMinSigmaGrey = 0.3;  // rounding to 8 bits
 
 // One model with everything free that photographs show, and where its simulators stand.
 struct FreeModel {
-  inference::Parameterization free;
+  engine::Parameterization free;
   std::unique_ptr<image::PhotoSimulator> here;
   struct Value {
     std::string object;  // whose value; empty: of all
@@ -37,13 +37,13 @@ struct FreeModel {
 
 FreeModel MakeFreeModel(const model::Model& model, const std::vector<std::string>& objects) {
   FreeModel made;
-  made.free = inference::Parameterization(model, objects);
+  made.free = engine::Parameterization(model, objects);
   for (size_t e = 0; e < model.effects.size(); ++e)
     if (images::ShowsInPhotographs(*model.effects[e].effect)) made.free.Free(static_cast<int>(e), true);
   made.here = std::make_unique<image::PhotoSimulator>(std::make_shared<const model::Model>(made.free.base()));
   const Eigen::VectorXd start = made.free.Start();
   for (int c = 0; c < made.free.size(); ++c) {
-    const inference::FreeParameter& parameter = made.free.parameters()[c];
+    const engine::FreeParameter& parameter = made.free.parameters()[c];
     FreeModel::Value value;
     value.object = parameter.object;
     value.rays = images::MovesRays(*model.effects[parameter.effect].effect);

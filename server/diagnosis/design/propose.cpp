@@ -49,17 +49,18 @@ bool Drifts(const model::Model& model) {
 
 }  // namespace
 
-absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const touches::Observations& observations,
-                                                          const std::vector<CompetingModel>& models,
-                                                          double sigma_s, int max_touches, uint64_t seed,
-                                                          ThreadPool* pool) {
+absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(
+    const touches::Observations& observations,
+    const std::vector<engine::ExplanationsLeft::NamedModel>& models, double sigma_s, int max_touches,
+    uint64_t seed, ThreadPool* pool) {
   if (models.empty())
     return absl::InvalidArgumentError("to propose touches takes at least one fitted model, got none");
   if (!(sigma_s > 0) || max_touches <= 0 || observations.size() == 0) return std::vector<ProposedTouch>();
 
   CandidateChoice choice;
   choice.seed = seed;
-  for (const CompetingModel& competing : models) choice.different_times |= Drifts(*competing.model);
+  for (const engine::ExplanationsLeft::NamedModel& competing : models)
+    choice.different_times |= Drifts(*competing.model);
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Observations candidates,
                               MakeCandidates(observations, *models[0].model, choice, pool));
   if (candidates.size() == 0) return std::vector<ProposedTouch>();
@@ -67,13 +68,13 @@ absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const touches::Observa
   const touches::Observations present = PresentData(observations);
   const double weight = double(observations.size()) / present.size();
   std::vector<LinearisedPrediction> predictions;
-  for (const CompetingModel& competing : models) {
+  for (const engine::ExplanationsLeft::NamedModel& competing : models) {
     TOUCHSTONE_ASSIGN_OR_RETURN(LinearisedPrediction prediction,
                                 Linearise(*competing.model, present, weight, candidates, sigma_s, pool));
     predictions.push_back(std::move(prediction));
   }
   std::vector<std::string> names;
-  for (const CompetingModel& competing : models) names.push_back(competing.name);
+  for (const engine::ExplanationsLeft::NamedModel& competing : models) names.push_back(competing.name);
   std::vector<ProposedTouch> proposed;
   for (const ChosenMeasurement& chosen :
        ChooseMeasurements(names, predictions, candidates.object, static_cast<int>(candidates.objects.size()),

@@ -9,17 +9,12 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/design/sequential_choice.h"
+#include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone::diagnosis::design {
-
-// A fitted model that explains the present data, and what people call it ("tip_radius").
-struct CompetingModel {
-  std::string name;
-  std::shared_ptr<const model::Model> model;
-};
 
 struct ProposedTouch {
   std::string object;
@@ -45,9 +40,9 @@ struct ProposedTouch {
 // With one model: where its values would be learnt best (D-optimal). Empty if no touch would discriminate:
 // then only another kind of measurement does. What a touch leaves to the next one (return_hysteresis) is not
 // planned. sigma_s: noise of one finger's time. Deterministic for a seed, whatever the pool.
-absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(const touches::Observations& observations,
-                                                          const std::vector<CompetingModel>& models,
-                                                          double sigma_s, int max_touches, uint64_t seed,
-                                                          ThreadPool* pool);
+absl::StatusOr<std::vector<ProposedTouch>> ProposeTouches(
+    const touches::Observations& observations,
+    const std::vector<engine::ExplanationsLeft::NamedModel>& models, double sigma_s, int max_touches,
+    uint64_t seed, ThreadPool* pool);
 
 }  // namespace touchstone::diagnosis::design

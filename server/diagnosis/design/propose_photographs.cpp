@@ -25,7 +25,7 @@ absl::StatusOr<std::vector<images::ProposedPhotograph>> ProposePhotographs(
   const std::vector<ViewCandidate> views = ListViews(photographs, kMaxViews, seed);
   std::vector<std::shared_ptr<const model::Model>> models;
   std::vector<std::string> names;
-  for (const images::PhotoExplanation& explanation : left.models) {
+  for (const engine::ExplanationsLeft::NamedModel& explanation : left.models) {
     models.push_back(explanation.model);
     names.push_back(explanation.name);
   }

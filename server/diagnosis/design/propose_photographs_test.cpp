@@ -107,7 +107,7 @@ Answer Ask(const DiagnosisInput& input, int photographs) {
 
 // Whether the diagnosis names this effect alone and is sure of it.
 bool IsSureOf(const images::PhotographDiagnosis& diagnosis, const std::string& effect) {
-  for (const images::PhotographStep& step : diagnosis.steps)
+  for (const engine::LadderStep& step : diagnosis.steps)
     if (step.effect == effect && step.equivalent.empty() && step.probability > 0.95) return true;
   return false;
 }
@@ -123,7 +123,8 @@ TEST(ProposePhotographs, FromAnotherDistanceTellFocalLengthFromCameraTranslation
   EXPECT_FALSE(IsSureOf(before.diagnosis, "camera_translation"));
   ASSERT_GE(before.next.size(), 4u);
   std::set<std::string> of_pair;
-  for (const images::PhotoExplanation& left : before.expectation.left.models) of_pair.insert(left.name);
+  for (const engine::ExplanationsLeft::NamedModel& left : before.expectation.left.models)
+    of_pair.insert(left.name);
   EXPECT_EQ(of_pair.count("focal_error") + of_pair.count("camera_translation"), 2u);
   bool elsewhere = false;
   for (const images::ProposedPhotograph& next : before.next) {

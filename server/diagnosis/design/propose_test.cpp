@@ -31,7 +31,7 @@ touches::Observations Present() {
 }
 
 std::vector<ProposedTouch> Proposed(const std::vector<Effects>& competing, int touches, uint64_t seed = 1) {
-  std::vector<CompetingModel> models;
+  std::vector<engine::ExplanationsLeft::NamedModel> models;
   for (const Effects& effects : competing) models.push_back({effects.back().first, ModelWith(effects)});
   auto proposed = ProposeTouches(Present(), models, kSigmaS, touches, seed, nullptr);
   EXPECT_TRUE(proposed.ok()) << proposed.status();

@@ -37,7 +37,7 @@ absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const Dia
   diagnosis.noise_floor = NoiseFloorOfPhotographs(photographs, expectation->before, context.pool);
   diagnosis.initial = QualityOfPhotographs(photographs, expectation->before, 0, context.pool);
   JudgeByPixels(photographs, diagnosis.noise_floor, &*diagnosis.initial);
-  const double floor = diagnosis.noise_floor.sigma_grey, rmse = diagnosis.initial->rmse_grey;
+  const double floor = diagnosis.noise_floor.sigma, rmse = diagnosis.initial->rmse;
   diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
   if (!diagnosis.noise_floor.from_repeats)
     diagnosis.warnings.push_back(
@@ -68,7 +68,7 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
   if (expectation == nullptr) expectation = &own;
   TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, Begin(input, context, expectation));
   if (expectation->photographs.poses < kMinPoses) {
-    diagnosis.verdict = selection::Verdict::kTooLittleData;
+    diagnosis.verdict = engine::Verdict::kTooLittleData;
     diagnosis.images_needed = kMinPoses;
   } else {
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));

@@ -24,11 +24,11 @@ PhotographDiagnosis Diagnosed(const DiagnosisInput& input) {
   EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
   if (!diagnosis.ok()) return {};
   std::cout << "verdict " << static_cast<int>(diagnosis->verdict) << ", floor "
-            << diagnosis->noise_floor.sigma_grey << ", rmse " << diagnosis->initial->rmse_grey << " -> "
-            << (diagnosis->final ? diagnosis->final->rmse_grey : 0) << ", p "
+            << diagnosis->noise_floor.sigma << ", rmse " << diagnosis->initial->rmse << " -> "
+            << (diagnosis->final ? diagnosis->final->rmse : 0) << ", p "
             << (diagnosis->final ? diagnosis->final->lack_of_fit_p : 0) << ", " << diagnosis->duration_s
             << " s\n";
-  for (const PhotographStep& step : diagnosis->steps) {
+  for (const engine::LadderStep& step : diagnosis->steps) {
     std::cout << "  + " << step.effect << " " << step.probability << " gain " << step.gain_nats;
     for (const auto& e : step.parameters)
       std::cout << "  " << e.object << " " << e.name << e.entry << " = " << e.value << " +- " << e.std_error;
@@ -51,7 +51,7 @@ PhotographDiagnosis Diagnosed(const DiagnosisInput& input) {
 
 TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput({}));
-  EXPECT_EQ(d.verdict, selection::Verdict::kAdequate);
+  EXPECT_EQ(d.verdict, engine::Verdict::kAdequate);
   EXPECT_TRUE(d.steps.empty());
 }
 
@@ -61,7 +61,7 @@ TEST(DiagnosePhotographs, DISABLED_FindsNothingInManySetsWhereNothingIsMissing) 
     HiddenCamera rig;
     rig.seed = seed;
     rig.sigma_grey = seed % 2 == 0 ? 1 : 3;
-    EXPECT_EQ(Diagnosed(MakePhotoInput(rig)).verdict, selection::Verdict::kAdequate) << seed;
+    EXPECT_EQ(Diagnosed(MakePhotoInput(rig)).verdict, engine::Verdict::kAdequate) << seed;
   }
 }
 
@@ -74,7 +74,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
     return 8 * std::exp(-0.5 * (x * x + y * y));
   };
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
-  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+  EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
   EXPECT_TRUE(d.steps.empty());
 }
 
@@ -89,7 +89,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
   };
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   EXPECT_TRUE(d.steps.empty());
-  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+  EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
 }
 
 TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
@@ -101,7 +101,7 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
   };
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   EXPECT_TRUE(d.steps.empty());
-  EXPECT_EQ(d.verdict, selection::Verdict::kUnexplained);
+  EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
 }
 
 TEST(DiagnosePhotographs, NamesBothOfAPair) {
@@ -109,15 +109,15 @@ TEST(DiagnosePhotographs, NamesBothOfAPair) {
   HiddenCamera rig;
   rig.hidden = {{"camera_rotation", {"rotation_deg=0.3,-0.2,0.4"}}, {"exposure", {"stops=0.15"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
-  EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
   ASSERT_EQ(d.steps.size(), 2u);
   // Half of the explanation fits nothing, even where what is left shows at contours alone.
-  EXPECT_GT(d.steps[0].quality.rmse_grey, 1.2 * d.noise_floor.sigma_grey);
+  EXPECT_GT(d.steps[0].quality.rmse, 1.2 * d.noise_floor.sigma);
   EXPECT_LT(d.steps[0].quality.lack_of_fit_p, 1e-6);
   // Each step's own unseen error, not that of the whole explanation.
-  EXPECT_GE(d.steps[0].quality.heldout_rmse_grey, d.steps[0].quality.rmse_grey);
-  EXPECT_GE(d.final->heldout_rmse_grey, d.final->rmse_grey);
-  EXPECT_LT(d.final->heldout_rmse_grey, 1.1 * d.final->rmse_grey);
+  EXPECT_GE(d.steps[0].quality.heldout_rmse, d.steps[0].quality.rmse);
+  EXPECT_GE(d.final->heldout_rmse, d.final->rmse);
+  EXPECT_LT(d.final->heldout_rmse, 1.1 * d.final->rmse);
   EXPECT_GT(d.final->lack_of_fit_p, 1e-3);
 }
 
@@ -130,7 +130,7 @@ TEST(DiagnosePhotographs, NamesALensBesideAnExposureThatAlbedoCouldHold) {
   rig.side_px = 112;
   rig.hidden = {{"radial_distortion", {"k1=-0.18", "k2=0.035"}}, {"exposure", {"stops=0.4"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
-  EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
   ASSERT_EQ(d.steps.size(), 2u);
   const bool lens_first = d.steps[0].effect == "radial_distortion";
   EXPECT_EQ(d.steps[0].effect, lens_first ? "radial_distortion" : "exposure");
@@ -166,7 +166,7 @@ TEST(DiagnosePhotographs, FindsTheFaintLightOfABlackGround) {
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   ASSERT_EQ(d.steps.size(), 1u);
   EXPECT_EQ(d.steps[0].effect, "background_level");
-  const inference::ParameterEstimate& grey = d.steps[0].parameters[0];
+  const engine::ParameterEstimate& grey = d.steps[0].parameters[0];
   EXPECT_NEAR(grey.value, 0.2, 3.5 * grey.std_error);
   EXPECT_LT(grey.std_error, 0.025);  // with what contours leave in doubt
 }
@@ -189,7 +189,7 @@ TEST(DiagnosePhotographs, GivesAnEffectOfTheModelItsRightValue) {
   input.model = std::make_shared<const model::Model>(WithPhotoEffects(
       model::NominalModel(), {{"image_noise", {"sigma_grey=2"}}, {"exposure", {"stops=0.1"}}}));
   const PhotographDiagnosis d = Diagnosed(input);
-  EXPECT_EQ(d.verdict, selection::Verdict::kWrongValues);
+  EXPECT_EQ(d.verdict, engine::Verdict::kWrongValues);
   ASSERT_EQ(d.refitted.size(), 1u);
   EXPECT_NEAR(d.refitted[0].parameters[0].value, 0.2, 0.002);
 }
@@ -222,11 +222,11 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
   HiddenCamera rig;
   rig.hidden = {{GetParam().effect, GetParam().values}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
-  EXPECT_EQ(d.verdict, selection::Verdict::kMissingEffects);
+  EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
   ASSERT_EQ(d.steps.size(), 1u);
   EXPECT_EQ(d.steps[0].effect, GetParam().effect);
   // Each value within three standard errors, and a pixel's share for what contours tell.
-  for (const inference::ParameterEstimate& e : d.steps[0].parameters) {
+  for (const engine::ParameterEstimate& e : d.steps[0].parameters) {
     double hidden = 0;
     for (const std::string& text : GetParam().values) {
       const std::vector<std::string> parts = absl::StrSplit(text, '=');
@@ -237,7 +237,7 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
     EXPECT_NEAR(e.value, hidden, 3 * e.std_error) << e.name << e.entry;
   }
   // Contours are sharp here: where one is off by a hundredth of a pixel, one pixel in a hundred along it is.
-  EXPECT_LT(d.final->rmse_grey, 1.15 * d.noise_floor.sigma_grey);
+  EXPECT_LT(d.final->rmse, 1.15 * d.noise_floor.sigma);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "server/base/status.h"
+#include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/images/photo_rest_sums.h"
 #include "server/diagnosis/images/photo_term_scores.h"
 #include "server/diagnosis/images/photo_terms.h"
-#include "server/diagnosis/selection/ladder.h"
 #include "server/effects/lookup.h"
 
 namespace touchstone::diagnosis::images {
@@ -57,30 +58,31 @@ class RestSearch {
   }
 
   // The errors with the effect as comparisons find them; none where it takes too little.
-  std::optional<RestSuggestion> Try(const std::shared_ptr<const model::Effect>& effect,
-                                    const TermScore& score) const {
+  absl::StatusOr<std::optional<RestSuggestion>> Try(const std::shared_ptr<const model::Effect>& effect,
+                                                    const TermScore& score) const {
+    const std::optional<RestSuggestion> none;
     model::Model with = model_;
     model::EffectInstance instance;
     instance.effect = effect;
     instance.values = effect->NeutralValues(with.fingers);
     with.effects.push_back(instance);
-    const auto expected = ExpectPhotographs(photographs_, with, false, pool_);
-    if (!expected.ok()) return std::nullopt;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
+                                ExpectPhotographs(photographs_, with, false, pool_));
     RestSuggestion tried;
-    tried.rmse_grey = RmseGrey(photographs_, *expected);
+    tried.rmse_grey = RmseGrey(photographs_, expected);
     const double fallen = std::pow(errors_.rmse_grey, 2) - std::pow(tried.rmse_grey, 2);
     const double held = std::min(score.taken_unseen / std::max(score.taken, 1e-300), 1.0);
     const double before2 = std::pow(errors_.heldout_rmse_grey, 2), floor2 = std::pow(errors_.floor_grey, 2);
     const double after2 = std::max(before2 - fallen * held, std::pow(tried.rmse_grey, 2));
-    if (!(before2 > floor2)) return std::nullopt;
+    if (!(before2 > floor2)) return none;
     tried.heldout_rmse_grey = std::sqrt(after2);
     tried.heldout_gain = std::clamp((before2 - after2) / (before2 - floor2), 0.0, 1.0);
-    if (tried.heldout_gain < kMinExcess) return std::nullopt;
+    if (tried.heldout_gain < kMinExcess) return none;
     model::Model only = model_;
-    const std::string yaml = selection::EffectYaml(only, std::move(instance));
+    const std::string yaml = engine::EffectYaml(only, std::move(instance));
     (effect->formula != nullptr ? tried.formula_yaml : tried.lookup_yaml) = yaml;
     if (effect->formula != nullptr) tried.formula = effect->formula->expression;
-    return tried;
+    return std::optional<RestSuggestion>(std::move(tried));
   }
 
  private:
@@ -92,13 +94,14 @@ class RestSearch {
 
 }  // namespace
 
-std::optional<RestSuggestion> SuggestForRest(const Photographs& photographs, const Photographs& judged,
-                                             const model::Model& model, const RestErrors& errors,
-                                             ThreadPool* pool) {
-  const auto expected = ExpectPhotographs(judged, model, true, pool);
-  if (!expected.ok()) return std::nullopt;
+absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& photographs,
+                                                             const Photographs& judged,
+                                                             const model::Model& model,
+                                                             const RestErrors& errors, ThreadPool* pool) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
+                              ExpectPhotographs(judged, model, true, pool));
   const PhotoTermDictionary dictionary = MakePhotoTerms(judged);
-  const RestSums sums(judged, model, *expected, dictionary, pool);
+  const RestSums sums(judged, model, expected, dictionary, pool);
   const double nameless = sums.Nameless();
   const double tries = static_cast<double>(dictionary.terms.size() + kCurveAxisCount);
   const RestSearch search(photographs, model, errors, pool);
@@ -109,9 +112,9 @@ std::optional<RestSuggestion> SuggestForRest(const Photographs& photographs, con
     const TermScore score = sums.ScoreCurve(axis);
     const double paid = std::log(static_cast<double>(kCurveAxisCount * kCurveBends));
     if (!RestSearch::Holds(score, paid, tries, nameless)) continue;
-    const auto effect = MakeCurve(kCurveAxes[axis], sums.ranges()[axis], score.values);
-    if (!effect.ok()) continue;
-    std::optional<RestSuggestion> tried = search.Try(*effect, score);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effect,
+                                MakeCurve(kCurveAxes[axis], sums.ranges()[axis], score.values));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<RestSuggestion> tried, search.Try(effect, score));
     if (!tried || (curve && tried->heldout_gain <= curve->heldout_gain)) continue;
     tried->covariate = kCurveAxes[axis].name;
     curve = std::move(tried);
@@ -130,11 +133,12 @@ std::optional<RestSuggestion> SuggestForRest(const Photographs& photographs, con
   for (size_t n = 0; n < std::min(order.size(), kMaxTried); ++n) {
     const size_t t = order[n].second;
     const TermScore& score = scores[t];
-    const auto effect = MakePhotoTermEffect(
-        dictionary.terms[t],
-        std::vector<double>(score.values.data(), score.values.data() + score.values.size()));
-    if (!effect.ok()) continue;
-    std::optional<RestSuggestion> tried = search.Try(*effect, score);
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const auto effect,
+        MakePhotoTermEffect(
+            dictionary.terms[t],
+            std::vector<double>(score.values.data(), score.values.data() + score.values.size())));
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<RestSuggestion> tried, search.Try(effect, score));
     if (!tried || (formula && tried->heldout_gain <= formula->heldout_gain)) continue;
     tried->covariate = dictionary.terms[t].covariate;
     formula = std::move(tried);

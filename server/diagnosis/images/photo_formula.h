@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include <absl/status/statusor.h>
+
 #include "server/diagnosis/images/photographs.h"
 
 namespace touchstone::diagnosis::images {
@@ -26,8 +28,10 @@ struct RestErrors {
 // is paid for by its evidence, with the scatter between poses as noise and the dictionary's size paid for; predicts poses
 // and objects that it was not fitted to; is nearly as good there as grey levels that stay at their places in the picture,
 // or on the objects, whatever they are (dirt on the lens, paint); and takes a fifth of the excess error or more.
-std::optional<RestSuggestion> SuggestForRest(const Photographs& photographs, const Photographs& judged,
-                                             const model::Model& model, const RestErrors& errors,
-                                             ThreadPool* pool);
+// Errors as ExpectPhotographs.
+absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& photographs,
+                                                             const Photographs& judged,
+                                                             const model::Model& model,
+                                                             const RestErrors& errors, ThreadPool* pool);
 
 }  // namespace touchstone::diagnosis::images

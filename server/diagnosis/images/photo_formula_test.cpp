@@ -42,7 +42,7 @@ double ErrorWith(const DiagnosisInput& input, const PhotographDiagnosis& diagnos
   again.model = std::make_shared<const model::Model>(*with);
   const auto compared = ComparePhotographs(again, {});
   EXPECT_TRUE(compared.ok()) << compared.status();
-  return compared->initial->rmse_grey;
+  return compared->initial->rmse;
 }
 
 TEST(SuggestForRest, FindsBandsAcrossThePicture) {
@@ -52,17 +52,17 @@ TEST(SuggestForRest, FindsBandsAcrossThePicture) {
   };
   const DiagnosisInput input = MakePhotoInput(rig);
   const PhotographDiagnosis diagnosis = DiagnosisOf(input);
-  EXPECT_EQ(diagnosis.verdict, selection::Verdict::kUnexplained);
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
   ASSERT_TRUE(diagnosis.unexplained.has_value());
-  const UnexplainedPhotographs& rest = *diagnosis.unexplained;
+  const engine::UnexplainedRest& rest = *diagnosis.unexplained;
   EXPECT_THAT(rest.formula, HasSubstr("sin(2*pi*row/period)"));
   EXPECT_THAT(rest.formula, HasSubstr("grey"));
   EXPECT_THAT(rest.formula_yaml, HasSubstr("adds: grey"));
   EXPECT_THAT(rest.lookup_yaml, testing::IsEmpty());
   EXPECT_GT(rest.heldout_gain, 0.8);
-  EXPECT_LT(rest.rmse_grey, 0.8 * diagnosis.final->rmse_grey);
-  EXPECT_GE(rest.heldout_rmse_grey, rest.rmse_grey);
-  EXPECT_NEAR(ErrorWith(input, diagnosis, rest.formula_yaml), rest.rmse_grey, 1e-3 * rest.rmse_grey);
+  EXPECT_LT(rest.rmse, 0.8 * diagnosis.final->rmse);
+  EXPECT_GE(rest.heldout_rmse, rest.rmse);
+  EXPECT_NEAR(ErrorWith(input, diagnosis, rest.formula_yaml), rest.rmse, 1e-3 * rest.rmse);
 }
 
 TEST(SuggestForRest, GivesACurveForARing) {
@@ -76,11 +76,11 @@ TEST(SuggestForRest, GivesACurveForARing) {
   const DiagnosisInput input = MakePhotoInput(rig);
   const PhotographDiagnosis diagnosis = DiagnosisOf(input);
   ASSERT_TRUE(diagnosis.unexplained.has_value());
-  const UnexplainedPhotographs& rest = *diagnosis.unexplained;
+  const engine::UnexplainedRest& rest = *diagnosis.unexplained;
   EXPECT_THAT(rest.lookup_yaml, HasSubstr("covariate: radius"));
   EXPECT_THAT(rest.formula_yaml, testing::IsEmpty());
   EXPECT_GT(rest.heldout_gain, 0.5);
-  EXPECT_NEAR(ErrorWith(input, diagnosis, rest.lookup_yaml), rest.rmse_grey, 1e-3 * rest.rmse_grey);
+  EXPECT_NEAR(ErrorWith(input, diagnosis, rest.lookup_yaml), rest.rmse, 1e-3 * rest.rmse);
 }
 
 TEST(SuggestForRest, NamesNoFormulaForDirtOnTheLens) {
@@ -95,7 +95,7 @@ TEST(SuggestForRest, NamesNoFormulaForDirtOnTheLens) {
     return -0.25 * photo.grey[pixel] * shade;
   };
   const PhotographDiagnosis diagnosis = DiagnosisOf(MakePhotoInput(rig));
-  EXPECT_EQ(diagnosis.verdict, selection::Verdict::kUnexplained);
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
   ASSERT_TRUE(diagnosis.unexplained.has_value());
   EXPECT_THAT(diagnosis.unexplained->formula_yaml, testing::IsEmpty());
   EXPECT_THAT(diagnosis.unexplained->lookup_yaml, testing::IsEmpty());
@@ -142,10 +142,10 @@ TEST(RankPhotoCandidates, PutTheHiddenEffectFirst) {
   ASSERT_EQ(candidates[0].parameters.size(), 1u);
   EXPECT_NEAR(candidates[0].parameters[0].value, 0.2, 0.02);
   double probability = 0;
-  std::set<std::pair<std::string, selection::EffectScope>> listed;
+  std::set<std::pair<std::string, engine::EffectScope>> listed;
   for (size_t n = 0; n < candidates.size(); ++n) {
     probability += candidates[n].probability;
-    if (candidates[n].scope == selection::EffectScope::kRig) {
+    if (candidates[n].scope == engine::EffectScope::kRig) {
       EXPECT_TRUE(listed.insert({candidates[n].effect, candidates[n].scope}).second) << candidates[n].effect;
     }
     if (n > 0 && candidates[n].probability > 0) {
@@ -155,7 +155,7 @@ TEST(RankPhotoCandidates, PutTheHiddenEffectFirst) {
   }
   EXPECT_LE(probability, 1 + 1e-9);
   // Its error is what a comparison with it alone finds.
-  EXPECT_NEAR(candidates[0].rmse_grey,
+  EXPECT_NEAR(candidates[0].rmse,
               ErrorWith(input, PhotographDiagnosis(),
                         absl::StrCat("  - exposure: {stops: ", candidates[0].parameters[0].value, "}\n")),
               1e-3);

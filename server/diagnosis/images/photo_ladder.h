@@ -15,7 +15,7 @@ absl::Status DescribeExplanation(const DiagnosisInput& input, const DiagnosisCon
                                  std::vector<image::Photo>* after);
 
 // The noise of the pixels as a step or a refit of the improved model.
-void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& quality, bool* refitted,
+void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality, bool* refitted,
                    model::Model* improved, PhotographDiagnosis* diagnosis);
 
 }  // namespace touchstone::diagnosis::images

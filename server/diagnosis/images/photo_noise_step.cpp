@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/images/photo_ladder.h"
 #include "server/effects/all_effects.h"
 
@@ -13,8 +14,8 @@ constexpr double kMinSigmaGrey = 0.15;  // less is rounding
 constexpr double kSeenErrors = 4;       // standard errors from where a difference counts
 constexpr double kSeenShare = 0.05;     // ... and of the value
 
-inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter, double value, double error) {
-  inference::ParameterEstimate estimate;
+engine::ParameterEstimate Estimate(const model::ParameterInfo& parameter, double value, double error) {
+  engine::ParameterEstimate estimate;
   estimate.name = parameter.name;
   estimate.unit = std::string(UnitSymbol(parameter.unit));
   estimate.value = value;
@@ -26,7 +27,7 @@ inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter, dou
 
 }  // namespace
 
-void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& quality, bool* refitted,
+void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality, bool* refitted,
                    model::Model* improved, PhotographDiagnosis* diagnosis) {
   const std::shared_ptr<const model::Effect> effect = effects::FindByRole(model::EffectRole::kPixelNoise);
   const double sigma =
@@ -34,7 +35,7 @@ void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& qua
   const bool grows = found.gain > kSeenErrors * found.gain_error;
   const double gain = grows ? found.gain : 0;
   const double error = sigma > 0 ? found.sigma_error * found.sigma_grey / sigma : found.sigma_error;
-  std::vector<inference::ParameterEstimate> parameters = {
+  std::vector<engine::ParameterEstimate> parameters = {
       Estimate(effect->parameters[0], sigma, error), Estimate(effect->parameters[1], gain, found.gain_error)};
   const auto own = std::find_if(
       improved->effects.begin(), improved->effects.end(),
@@ -45,15 +46,13 @@ void AddPixelNoise(const PixelNoise& found, int channels, const GreyQuality& qua
     instance.effect = effect;
     instance.values = {sigma, gain};
     improved->effects.push_back(instance);
-    PhotographStep step;
+    engine::LadderStep step;
     step.effect = effect->name;
-    step.probability = selection::kMaxProbability;
+    step.probability = engine::kMaxProbability;
     step.parameters = parameters;
     step.quality = quality;
     step.model = *improved;
-    step.meaning = effect->meaning;
-    step.check_on_rig = effect->check_on_rig;
-    step.remedy = effect->remedy;
+    engine::AddTexts(*effect, &step);
     diagnosis->steps.push_back(std::move(step));
     *refitted = true;
     return;

@@ -14,36 +14,39 @@ constexpr PhotoRowsOptions kPolish = {12544, 1, 100};
 
 }  // namespace
 
-absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
-                                           const DiagnosisContext& context) {
+absl::StatusOr<PolishRows> MakePolishRows(const Photographs& photographs, const engine::Fit& fit,
+                                          const DiagnosisContext& context) {
+  const model::Model& anchor = fit.model.base();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                               ExpectPhotographs(photographs, anchor, false, context.pool));
   PhotoRowsOptions options = kPolish;
   options.contour_px2 = ContourPlaceVariance(photographs, expected, context.pool);
-  return MakePhotoSearch(photographs, anchor, {}, options, context);
+  PolishRows made;
+  TOUCHSTONE_ASSIGN_OR_RETURN(made.search, MakePhotoSearch(photographs, anchor, {}, options, context));
+  made.experiment = *made.search.experiment;
+  if (fit.hypothesis != 0) return made;
+  made.plain = std::make_unique<engine::Likelihood>(made.search.rows->GroupRows(), nullptr, 0, nullptr);
+  made.plain->SetLeastNoise(1);
+  made.experiment.likelihood = made.plain.get();
+  return made;
 }
 
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection) {
   selection->polished = selection->fit;
   if (selection->fit.model.size() == 0) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch all,
-                              MakePolishRows(photographs, selection->fit.model.base(), context));
-  inference::Likelihood plain(all.rows->GroupRows(), nullptr, 0, nullptr);
-  plain.SetLeastNoise(1);
-  inference::Experiment experiment = *all.experiment;
-  if (selection->fit.hypothesis == 0) experiment.likelihood = &plain;
-  TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, inference::FitModel(experiment, selection->fit.model));
-  selection->covariance = CovarianceBetweenBlocks(experiment, selection->polished);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const PolishRows all, MakePolishRows(photographs, selection->fit, context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, engine::FitModel(all.experiment, selection->fit.model));
+  selection->covariance = CovarianceBetweenBlocks(all.experiment, selection->polished);
   return absl::OkStatus();
 }
 
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit) {
+Eigen::MatrixXd CovarianceBetweenBlocks(const engine::Experiment& experiment, const engine::Fit& fit) {
   const int p = fit.model.size(), n = experiment.observations->rows();
   if (p == 0) return fit.covariance;
   const Eigen::VectorXd left =
       fit.columns.values.col(0) -
-      experiment.likelihood->FieldMean(inference::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
+      experiment.likelihood->FieldMean(engine::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
   std::map<int, Eigen::VectorXd> scores;
   for (int row = 0; row < n; ++row) {
     Eigen::VectorXd& score =

@@ -9,8 +9,8 @@
 #include "server/base/distributions.h"
 #include "server/base/normal.h"
 #include "server/base/status.h"
+#include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/images/photo_cells.h"
-#include "server/diagnosis/inference/held_out.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -39,9 +39,9 @@ PixelNoise NoiseOfResiduals(const Photographs& p, const std::vector<image::Photo
   return all.Estimate();
 }
 
-GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<image::Photo>& expected,
-                                       ThreadPool* pool) {
-  GreyNoiseFloor floor;
+engine::NoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<image::Photo>& expected,
+                                           ThreadPool* pool) {
+  engine::NoiseFloor floor;
   const double pixels = static_cast<double>(p.width()) * p.height();
   std::map<int, std::vector<int>> poses;
   for (int k = 0; k < p.size(); ++k) poses[p.pose[k]].push_back(k);
@@ -58,18 +58,18 @@ GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vector<i
   }
   floor.from_repeats = floor.degrees_of_freedom >= kMinRepeatPixels;
   if (floor.from_repeats) {
-    floor.sigma_grey = std::sqrt(squares / floor.degrees_of_freedom);
+    floor.sigma = std::sqrt(squares / floor.degrees_of_freedom);
   } else {
     const RecordTable record(NoiseOfResiduals(p, expected, pool));
     double variance = 0;
     for (int k = 0; k < p.size(); ++k)
       for (const float grey : expected[k].grey) variance += record.Variance(grey);
     floor.degrees_of_freedom = kEfficiency * pixels * p.size();
-    floor.sigma_grey = std::sqrt(variance / (pixels * std::max(p.size(), 1)));
+    floor.sigma = std::sqrt(variance / (pixels * std::max(p.size(), 1)));
   }
   const double share = kNormalQuantile975 / std::sqrt(2 * floor.degrees_of_freedom);
-  floor.lower_grey = floor.sigma_grey * (1 - share);
-  floor.upper_grey = floor.sigma_grey * (1 + share);
+  floor.lower = floor.sigma * (1 - share);
+  floor.upper = floor.sigma * (1 + share);
   return floor;
 }
 
@@ -111,26 +111,27 @@ double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expec
   return ChiSquaredTail(sum / kVarianceKnown, freedom);
 }
 
-GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
-                                 int parameters, ThreadPool* pool) {
-  GreyQuality quality;
-  quality.rmse_grey = quality.heldout_rmse_grey = RmseGrey(photographs, expected);
+engine::Quality QualityOfPhotographs(const Photographs& photographs,
+                                     const std::vector<image::Photo>& expected, int parameters,
+                                     ThreadPool* pool) {
+  engine::Quality quality;
+  quality.rmse = quality.heldout_rmse = RmseGrey(photographs, expected);
   quality.lack_of_fit_p = PatchMisfitP(photographs, expected, parameters, pool);
   return quality;
 }
 
-void JudgeByPixels(const Photographs& p, const GreyNoiseFloor& floor, GreyQuality* quality) {
+void JudgeByPixels(const Photographs& p, const engine::NoiseFloor& floor, engine::Quality* quality) {
   const double freedom = kEfficiency * p.width() * p.height() * p.size();
-  const double ratio = quality->rmse_grey / (kContours * floor.sigma_grey);
-  if (!(floor.sigma_grey > 0) || ratio <= 1) return;
+  const double ratio = quality->rmse / (kContours * floor.sigma);
+  if (!(floor.sigma > 0) || ratio <= 1) return;
   quality->lack_of_fit_p = std::min(quality->lack_of_fit_p, ChiSquaredTail(freedom * ratio * ratio, freedom));
 }
 
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
-                                    const inference::Experiment& experiment, const inference::Fit& fit) {
+                                    const engine::Experiment& experiment, const engine::Fit& fit) {
   if (fit.model.size() == 0) return 1;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<inference::RefitWithoutPart>> divisions,
-                              inference::RefitWithoutParts(experiment, fit));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<engine::RefitWithoutPart>> divisions,
+                              engine::RefitWithoutParts(experiment, fit));
   const auto squares_of = [&](const model::Model& model,
                               const std::set<int>& which) -> absl::StatusOr<double> {
     TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -142,9 +143,9 @@ absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoR
   for (int row = 0; row < rows.rows(); ++row) all.insert(rows.PhotographOfRow(row));
   TOUCHSTONE_ASSIGN_OR_RETURN(const double seen, squares_of(fit.model.base(), all));
   double largest = seen;
-  for (const std::vector<inference::RefitWithoutPart>& refits : divisions) {
+  for (const std::vector<engine::RefitWithoutPart>& refits : divisions) {
     double unseen = 0;
-    for (const inference::RefitWithoutPart& refit : refits) {
+    for (const engine::RefitWithoutPart& refit : refits) {
       std::set<int> which;
       for (const int row : refit.rows) which.insert(rows.PhotographOfRow(row));
       TOUCHSTONE_ASSIGN_OR_RETURN(const double squares, squares_of(refit.fit.model.base(), which));
@@ -155,13 +156,13 @@ absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoR
   return seen > 0 ? std::sqrt(largest / seen) : 1;
 }
 
-double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+double HeldOutExcess(const PhotoSearch& search, const engine::Fit& fit, const Photographs& photographs,
                      double floor_grey) {
   if (fit.model.size() == 0) return 0;
   const double rows = search.rows->rows();
   const double seen = fit.columns.values.col(0).squaredNorm();
-  const double unseen = std::max(inference::HeldOutRmse(*search.experiment, fit),
-                                 inference::HeldOutRmseByBlock(*search.experiment, fit));
+  const double unseen = std::max(engine::HeldOutRmse(*search.experiment, fit),
+                                 engine::HeldOutRmseByBlock(*search.experiment, fit));
   const double pixels =
       static_cast<double>(photographs.width()) * photographs.height() * search.rows->photographs();
   return std::max(rows * unseen * unseen - seen, 0.0) * floor_grey * floor_grey / pixels;

@@ -9,8 +9,8 @@ namespace touchstone::diagnosis::images {
 
 // From repeats of a pose where there are enough, else from what neighbouring pixels of the residuals differ by.
 // `expected`: of the best model.
-GreyNoiseFloor NoiseFloorOfPhotographs(const Photographs& photographs,
-                                       const std::vector<image::Photo>& expected, ThreadPool* pool);
+engine::NoiseFloor NoiseFloorOfPhotographs(const Photographs& photographs,
+                                           const std::vector<image::Photo>& expected, ThreadPool* pool);
 
 // The noise of single pixels of what `expected` leaves, rounding to 8 bits included.
 PixelNoise NoiseOfResiduals(const Photographs& photographs, const std::vector<image::Photo>& expected,
@@ -27,23 +27,24 @@ double PatchMisfitP(const Photographs& photographs, const std::vector<image::Pho
                     ThreadPool* pool);
 
 // Error and lack of fit; the held-out error is the same error, as it is where nothing was fitted.
-GreyQuality QualityOfPhotographs(const Photographs& photographs, const std::vector<image::Photo>& expected,
-                                 int parameters, ThreadPool* pool);
+engine::Quality QualityOfPhotographs(const Photographs& photographs,
+                                     const std::vector<image::Photo>& expected, int parameters,
+                                     ThreadPool* pool);
 
 // The same of single pixels, whose error at contours patches hardly count: lowers quality->lack_of_fit_p where the error
 // lies farther above the floor than contours that were sampled at pixel centres explain (a tenth).
-void JudgeByPixels(const Photographs& photographs, const GreyNoiseFloor& floor, GreyQuality* quality);
+void JudgeByPixels(const Photographs& photographs, const engine::NoiseFloor& floor, engine::Quality* quality);
 
 // The error on photographs that a fit did not see over the error on the same photographs where it saw them, over all
 // their pixels; at least 1. The fit is made anew without each object, without each fifth of the poses and without each
 // fifth of the session (inference/held_out.h): of the three the largest. `experiment`: of these rows. Errors as
-// inference::RefitWithoutParts.
+// engine::RefitWithoutParts.
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
-                                    const inference::Experiment& experiment, const inference::Fit& fit);
+                                    const engine::Experiment& experiment, const engine::Fit& fit);
 
 // For a ranking of many fits, quickly: what pictures have as mean square grey levels beyond those that the fit saw, where
 // one linear step of it makes up for what is left out. Of a step that is claimed, see HeldOutRatio.
-double HeldOutExcess(const PhotoSearch& search, const inference::Fit& fit, const Photographs& photographs,
+double HeldOutExcess(const PhotoSearch& search, const engine::Fit& fit, const Photographs& photographs,
                      double floor_grey);
 
 }  // namespace touchstone::diagnosis::images

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/parameterization.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_view.h"
-#include "server/diagnosis/inference/parameterization.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -21,7 +21,7 @@ std::string KeyOf(const model::Model& model, const std::string& object) {
     const absl::Span<const double> values = instance.ValuesFor(object);
     if (std::vector<double>(values.begin(), values.end()) == instance.effect->NeutralValues(model.fingers))
       continue;
-    key += '\n' + inference::NameOf(*instance.effect) + ' ';
+    key += '\n' + engine::NameOf(*instance.effect) + ' ';
     key.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
   }
   return key;
@@ -104,7 +104,7 @@ void PhotoRows::Number(const std::vector<Direction>& directions) {
   for (size_t v = 0; v < views_.size(); ++v) {
     measured_.segment(first_row_[v], views_[v]->measured.size()) = views_[v]->measured;
     const int object = photographs_.object[views_[v]->k];
-    for (inference::SmoothErrorSite& site : views_[v]->sites) {
+    for (engine::SmoothErrorSite& site : views_[v]->sites) {
       site.first_row = first_row_[v];
       albedo_.distinct_m[object].push_back(site.position_m);
       for (const double row : site.row_per_m) albedo_.mean_row_per_m += row * row;

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/engine/observation_model.h"
+#include "server/diagnosis/engine/smooth_error.h"
 #include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/images/photographs.h"
-#include "server/diagnosis/inference/observation_model.h"
-#include "server/diagnosis/inference/smooth_error.h"
 
 namespace touchstone::diagnosis::images {
 
@@ -31,7 +31,7 @@ struct PhotoRowsOptions {
   double contour_px2 = kUnknownPlacePx2;  // variance of a contour's place
 };
 
-class PhotoRows : public inference::ObservationModel {
+class PhotoRows : public engine::ObservationModel {
  public:
   // `photographs` must outlive it. `effects`: that may be missing; those of the anchor are added. Errors: what the
   // simulator says of the anchor.
@@ -56,9 +56,10 @@ class PhotoRows : public inference::ObservationModel {
   Eigen::VectorXd Change(const std::vector<double>& predicted,
                          const std::vector<double>& moved) const override;
   double DerivativeStep() const override { return 0.25; }
+  bool HasRoughDerivatives(const model::Effect& effect) const override { return MovesRays(effect); }
 
   // Where a smooth error of the objects' albedo enters: a share h of the light of a place.
-  const inference::SmoothErrorGeometry& albedo() const { return albedo_; }
+  const engine::SmoothErrorGeometry& albedo() const { return albedo_; }
   std::vector<int> GroupRows() const { return first_row_of_group_; }
   int PhotographOfRow(int row) const { return photograph_of_row_[row]; }
   int photographs() const { return static_cast<int>(views_.size()); }
@@ -86,7 +87,7 @@ class PhotoRows : public inference::ObservationModel {
   std::vector<int> first_row_, first_row_of_group_, photograph_of_row_;
   std::map<std::pair<std::string, int>, int> slope_of_;  // (effect, value) -> column of the views' slopes
   Eigen::VectorXd measured_;
-  inference::SmoothErrorGeometry albedo_;
+  engine::SmoothErrorGeometry albedo_;
 
   mutable std::mutex mutex_;
   mutable std::map<std::string, std::shared_ptr<const std::vector<double>>> known_;  // rows of one object

@@ -4,12 +4,10 @@
 #include <cmath>
 #include <iterator>
 
-#include "server/base/decompositions.h"
-#include "server/base/distributions.h"
 #include "server/base/status.h"
+#include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/inference/held_out.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::images {
@@ -17,27 +15,16 @@ namespace {
 
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
 constexpr PhotoRowsOptions kFine = {12544, 1, 30};
-constexpr double kStepP = 1e-4;  // of a step's values, with the scatter between pictures
-constexpr double kSameLikelihoodNats = 1;
-// Two causes that are known to move contours nearly alike are told apart by a clear share of what they explain only: a
-// contour is sampled at points, so that an explanation that is off by a twentieth of a pixel, for its values or for its
-// place in the search, loses more than the likelihood knows.
-constexpr double kClearShare = 0.2;
+constexpr double kStepP = 1e-4;                // of a step's values, with the scatter between pictures
 constexpr double kFaint = 0.1;                 // of the noise
 constexpr double kWidthStarts[] = {0.5, 1.0};  // over the typical size
 constexpr int kAnchorPasses = 5;
 constexpr double kAnchorStays =
     1;  // standard errors by which a value moves from an anchor that is near enough
 
-bool HasEffect(const model::Model& model, const model::Effect& effect) {
-  return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
-    return inference::NameOf(*instance.effect) == inference::NameOf(effect);
-  });
-}
-
 // Where the last of several parameters changes nothing until the first does, further places to start from; and for
 // widths, which blur so little near zero that no slope leads away from there.
-void AddStarts(const selection::Candidate& candidate, int fingers, std::vector<selection::Candidate>* all) {
+void AddStarts(const engine::Candidate& candidate, int fingers, std::vector<engine::Candidate>* all) {
   const model::Effect& effect = *candidate.effect;
   if (MovesRays(effect) || effect.parameters.empty() || effect.formula != nullptr) return;
   const model::ParameterInfo& last = effect.parameters.back();
@@ -51,7 +38,7 @@ void AddStarts(const selection::Candidate& candidate, int fingers, std::vector<s
     const double value = std::clamp(last.neutral + times * last.typical, last.lower, last.upper);
     if (std::find(tried.begin(), tried.end(), value) != tried.end()) continue;
     tried.push_back(value);
-    selection::Candidate further = candidate;
+    engine::Candidate further = candidate;
     further.starts_at = effect.NeutralValues(fingers);
     further.starts_at.back() = value * SiFactor(last.unit);
     all->push_back(std::move(further));
@@ -59,60 +46,18 @@ void AddStarts(const selection::Candidate& candidate, int fingers, std::vector<s
 }
 
 // Whether the values of effect `index` differ from what changes nothing, under this covariance.
-bool IsSeen(const inference::Fit& fit, int index, const Eigen::MatrixXd& covariance) {
+bool IsSeen(const engine::Fit& fit, int index, const Eigen::MatrixXd& covariance) {
   std::vector<int> own;
   for (int i = 0; i < fit.model.size(); ++i)
-    if (fit.model.parameters()[i].effect == index && covariance(i, i) > 0) own.push_back(i);
+    if (fit.model.parameters()[i].effect == index) own.push_back(i);
   const int n = static_cast<int>(own.size());
-  if (n == 0) return false;
   Eigen::VectorXd value(n);
   Eigen::MatrixXd part(n, n);
   for (int a = 0; a < n; ++a) {
     value[a] = fit.point[own[a]] - fit.model.parameters()[own[a]].neutral;
     for (int b = 0; b < n; ++b) part(a, b) = covariance(own[a], own[b]);
   }
-  // Correlated values are scaled before they are solved for.
-  const Eigen::VectorXd scale = part.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::VectorXd scaled = scale.cwiseProduct(value);
-  const Eigen::MatrixXd correlation = scale.asDiagonal() * part * scale.asDiagonal();
-  const double wald = scaled.dot(SymmetricSolver(correlation).Solve(scaled));
-  return ChiSquaredTail(wald, n) < kStepP;
-}
-
-absl::Status FindCompetitors(PhotoSelection* selection) {
-  const selection::StepwiseSearch& search = *selection->fine.search;
-  const selection::Explanation whole{selection->fit, selection->initial_effects};
-  const inference::Fit& fit = selection->fit;
-  for (int index = selection->initial_effects; index < static_cast<int>(fit.model.base().effects.size());
-       ++index) {
-    if (index == selection->field) continue;
-    selection::SelectedStep step;
-    step.effect = index;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const inference::Fit without, search.WithoutEffect(whole, index));
-    step.gain_nats = fit.log_evidence - without.log_evidence;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::CompetingFit> competing,
-                                search.CompetingFits(whole, index));
-    const model::Effect& own = *fit.model.base().effects[index].effect;
-    std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
-    for (const selection::CompetingFit& other : competing) {
-      const double evidence = other.fit.log_evidence - fit.log_evidence;
-      const bool same = other.name == inference::NameOf(own);
-      const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
-      const bool declared = selection::IsDeclaredConfounded(own, other.name);
-      const bool equivalent = evidence > -search.rules().equivalent_nats ||
-                              (as_likely && (declared || other.fit.model.size() <= fit.model.size())) ||
-                              (declared && MovesRays(own) && evidence > -kClearShare * step.gain_nats);
-      all.push_back(evidence);
-      if (same || equivalent) same_or_equivalent.push_back(evidence);
-      if (!same && other.name != kImageFieldName)
-        step.competing.push_back({other.name, other.per_object, other.object, evidence, equivalent, false,
-                                  other.fit.model.base()});
-    }
-    step.probability =
-        selection::ProbabilityOfShare(inference::LogSum(same_or_equivalent) - inference::LogSum(all));
-    selection->steps.push_back(std::move(step));
-  }
-  return absl::OkStatus();
+  return engine::WaldP(value, part) < kStepP;
 }
 
 // A field that is small against the noise is what simulation and noise are known to, not dirt.
@@ -126,8 +71,8 @@ absl::Status DropFaintField(PhotoSelection* selection) {
     const Eigen::VectorXf field = ImageFieldFunctions(side, side) * values;
     const double rms = field.norm() / side;
     if (rms > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
-                                                                    selection->fit.model.Without(index)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
     return absl::OkStatus();
   }
   return absl::OkStatus();
@@ -141,8 +86,8 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
       if (IsSeen(selection->fit, index, selection->covariance)) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, inference::FitModel(*selection->fine.experiment,
-                                                                      selection->fit.model.Without(index)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
       dropped = true;
     }
   }
@@ -152,7 +97,7 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
 // Derivatives by what moves rays are the anchor's. A value that moved contours by several pixels away from it may have
 // stopped where those derivatives no longer lead downwards: from there they are taken again, until nothing moves.
 absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& context,
-                        selection::Explanation* explanation) {
+                        engine::Explanation* explanation) {
   const std::vector<model::EffectInstance>& effects = explanation->fit.model.base().effects;
   if (std::none_of(effects.begin() + explanation->initial_effects, effects.end(),
                    [](const model::EffectInstance& instance) { return MovesRays(*instance.effect); }))
@@ -161,8 +106,7 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const PhotoSearch there,
         MakePhotoSearch(photographs, explanation->fit.model.base(), {}, kCoarse, context));
-    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit fit,
-                                inference::FitModel(*there.experiment, explanation->fit.model));
+    TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(*there.experiment, explanation->fit.model));
     double farthest = 0;  // standard errors
     for (int i = 0; i < fit.model.size(); ++i)
       if (fit.covariance(i, i) > 0)
@@ -176,21 +120,22 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
 
 }  // namespace
 
-std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
-                                                  const Photographs& photographs) {
-  std::vector<selection::Candidate> candidates;
+std::vector<engine::Candidate> PhotoCandidates(const DiagnosisInput& input, const Photographs& photographs) {
+  std::vector<engine::Candidate> candidates;
   std::vector<std::shared_ptr<const model::Effect>> effects;
   for (const auto& effect : effects::TouchEffects())
     if (effect->moves_surface && !input.IsSettled(effect->name)) effects.push_back(effect);
   for (const auto& effect : effects::PhotoEffects()) effects.push_back(effect);
   effects.push_back(ImageFieldEffect());
   for (const auto& effect : effects) {
-    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) || HasEffect(*input.model, *effect))
+    if (effect->parameters.empty() || !ShowsInPhotographs(*effect) ||
+        engine::HasEffect(*input.model, engine::NameOf(*effect)))
       continue;
-    selection::Candidate candidate;
+    engine::Candidate candidate;
     candidate.effect = effect;
+    candidate.nameless = effect->name == kImageFieldName;
     candidates.push_back(candidate);
-    if (effect->name == kImageFieldName) continue;
+    if (candidate.nameless) continue;
     AddStarts(candidate, input.model->fingers, &candidates);
     if (!effect->often_per_object || photographs.objects.size() < 2) continue;
     candidate.per_object = true;
@@ -202,8 +147,9 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
     }
   }
   for (const auto& effect : input.also)
-    if (ShowsInPhotographs(*effect) && effect->of_photos() && !HasEffect(*input.model, *effect)) {
-      selection::Candidate candidate;
+    if (ShowsInPhotographs(*effect) && effect->of_photos() &&
+        !engine::HasEffect(*input.model, engine::NameOf(*effect))) {
+      engine::Candidate candidate;
       candidate.effect = effect;
       candidate.of_user = true;
       candidates.push_back(candidate);
@@ -212,33 +158,33 @@ std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
 }
 
 absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
-                                            const std::vector<selection::Candidate>& candidates,
+                                            const std::vector<engine::Candidate>& candidates,
                                             const PhotoRowsOptions& options,
                                             const DiagnosisContext& context) {
   PhotoSearch made;
   std::vector<std::shared_ptr<const model::Effect>> effects;
-  for (const selection::Candidate& candidate : candidates) effects.push_back(candidate.effect);
+  for (const engine::Candidate& candidate : candidates) effects.push_back(candidate.effect);
   TOUCHSTONE_ASSIGN_OR_RETURN(made.rows,
                               PhotoRows::Make(photographs, anchor, effects, options, context.pool));
   made.likelihood =
-      std::make_unique<inference::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0, context.pool);
+      std::make_unique<engine::Likelihood>(made.rows->GroupRows(), &made.rows->albedo(), 0, context.pool);
   made.likelihood->SetLeastNoise(1);
-  made.experiment = std::make_unique<inference::Experiment>();
+  made.experiment = std::make_unique<engine::Experiment>();
   made.experiment->observations = made.rows.get();
   made.experiment->likelihood = made.likelihood.get();
   made.experiment->pool = context.pool;
-  selection::SearchRules rules;
+  engine::SearchRules rules;
   rules.cv_gain_over_noise = true;
-  made.search = std::make_unique<selection::StepwiseSearch>(*made.experiment, candidates, rules,
-                                                            [](const std::string&) {});
+  made.search = std::make_unique<engine::StepwiseSearch>(*made.experiment, candidates, rules,
+                                                         [](const std::string&) {});
   return made;
 }
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context) {
-  const std::vector<selection::Candidate> candidates = PhotoCandidates(input, photographs);
-  const inference::Parameterization base(*input.model, photographs.objects);
+  const std::vector<engine::Candidate> candidates = PhotoCandidates(input, photographs);
+  const engine::Parameterization base(*input.model, photographs.objects);
   const auto enter = [&](const char* stage, double done) {
     return !context.progress || context.progress(stage, done)
                ? absl::OkStatus()
@@ -246,7 +192,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   };
   PhotoSelection selection;
   selection.initial_effects = static_cast<int>(input.model->effects.size());
-  selection::Explanation explanation;
+  engine::Explanation explanation;
   {
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch coarse,
                                 MakePhotoSearch(photographs, *input.model, candidates, kCoarse, context));
@@ -270,7 +216,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
       MakePhotoSearch(*selection.photographs, explanation.fit.model.base(), candidates, options, context));
   selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
-  TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, inference::FitModel(*selection.fine.experiment, base));
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, engine::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
@@ -279,20 +225,23 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   for (size_t e = 0; e < selection.fit.model.base().effects.size(); ++e)
     if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
       selection.field = static_cast<int>(e);
-  TOUCHSTONE_RETURN_IF_ERROR(FindCompetitors(&selection));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.steps,
+      engine::FindCompetitors(*selection.fine.search, {selection.fit, selection.initial_effects},
+                              selection.field, {}));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.heldout_ratio,
       HeldOutRatio(*selection.photographs, *selection.fine.rows, *selection.fine.experiment, selection.fit));
   TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(*selection.photographs, context, &selection));
-  const inference::Likelihood& likelihood = *selection.fine.likelihood;
-  const inference::Likelihood::Columns residual = inference::Likelihood::Pick(selection.fit.columns, {0});
+  const engine::Likelihood& likelihood = *selection.fine.likelihood;
+  const engine::Likelihood::Columns residual = engine::Likelihood::Pick(selection.fit.columns, {0});
   std::vector<double> with;
   const double none =
       likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);
   for (int s = 1; s < static_cast<int>(likelihood.hypotheses().size()); ++s)
     with.push_back(likelihood.LogPrior(s) + likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s));
-  selection.albedo_nats = inference::LogSum(with) - none;
+  selection.albedo_nats = engine::LogSum(with) - none;
   return selection;
 }
 

@@ -5,42 +5,41 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/images/photo_rows.h"
-#include "server/diagnosis/inference/fit.h"
-#include "server/diagnosis/selection/selection.h"
-#include "server/diagnosis/selection/stepwise_search.h"
+#include "server/diagnosis/input.h"
 
 namespace touchstone::diagnosis::images {
 
 // What one search works on. The parts point to one another.
 struct PhotoSearch {
   std::unique_ptr<PhotoRows> rows;
-  std::unique_ptr<inference::Likelihood> likelihood;
-  std::unique_ptr<inference::Experiment> experiment;
-  std::unique_ptr<selection::StepwiseSearch> search;
+  std::unique_ptr<engine::Likelihood> likelihood;
+  std::unique_ptr<engine::Experiment> experiment;
+  std::unique_ptr<engine::StepwiseSearch> search;
 };
 
 // Effects of photographs, those of touches that move the surface, and the nameless image field, as far as the model
 // lacks them; and the user's own.
-std::vector<selection::Candidate> PhotoCandidates(const DiagnosisInput& input,
-                                                  const Photographs& photographs);
+std::vector<engine::Candidate> PhotoCandidates(const DiagnosisInput& input, const Photographs& photographs);
 
 absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
-                                            const std::vector<selection::Candidate>& candidates,
+                                            const std::vector<engine::Candidate>& candidates,
                                             const PhotoRowsOptions& options, const DiagnosisContext& context);
 
 struct PhotoSelection {
   // The same photographs, with the noise of what the coarse search leaves: what the fine one and its fits work on.
   std::unique_ptr<Photographs> photographs;
   PhotoSearch fine;
-  inference::Fit initial;  // the given model, in fine rows
-  inference::Fit fit;      // the explanation; the image field among its effects where it takes part
+  engine::Fit initial;  // the given model, in fine rows
+  engine::Fit fit;      // the explanation; the image field among its effects where it takes part
   // The explanation fitted to every photograph, contours trusted as what the explanation leaves shows: what its values
   // are taken from.
-  inference::Fit polished;
+  engine::Fit polished;
   int initial_effects = 0;
-  int field = -1;                              // index of the image field's effect; -1: none
-  std::vector<selection::SelectedStep> steps;  // named effects
+  int field = -1;                           // index of the image field's effect; -1: none
+  std::vector<engine::SelectedStep> steps;  // named effects
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
   // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
   double heldout_ratio = 1;
@@ -51,9 +50,15 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context);
 
-// Rows of every photograph at an anchor that is near, contours trusted as what it leaves shows: no candidates.
-absl::StatusOr<PhotoSearch> MakePolishRows(const Photographs& photographs, const model::Model& anchor,
-                                           const DiagnosisContext& context);
+// Rows of every photograph near a fit, contours trusted as what it leaves shows; no candidates. Without a smooth error of
+// the albedo where the fit has none. The parts point to one another.
+struct PolishRows {
+  PhotoSearch search;
+  std::unique_ptr<engine::Likelihood> plain;
+  engine::Experiment experiment;
+};
+absl::StatusOr<PolishRows> MakePolishRows(const Photographs& photographs, const engine::Fit& fit,
+                                          const DiagnosisContext& context);
 
 // Fits the explanation to every photograph: `polished` and `covariance`.
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
@@ -61,6 +66,6 @@ absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisCo
 
 // The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where
 // that is larger.
-Eigen::MatrixXd CovarianceBetweenBlocks(const inference::Experiment& experiment, const inference::Fit& fit);
+Eigen::MatrixXd CovarianceBetweenBlocks(const engine::Experiment& experiment, const engine::Fit& fit);
 
 }  // namespace touchstone::diagnosis::images

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/parameterization.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_flow.h"
-#include "server/diagnosis/inference/parameterization.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::images {
@@ -50,9 +50,8 @@ std::vector<PhotoRows::Direction> PhotoRows::DirectionsOf(
   std::vector<std::shared_ptr<const model::Effect>> all;
   for (const model::EffectInstance& instance : anchor.effects) all.push_back(instance.effect);
   for (const auto& effect : effects)
-    if (std::none_of(all.begin(), all.end(), [&](const auto& other) {
-          return inference::NameOf(*other) == inference::NameOf(*effect);
-        }))
+    if (std::none_of(all.begin(), all.end(),
+                     [&](const auto& other) { return engine::NameOf(*other) == engine::NameOf(*effect); }))
       all.push_back(effect);
   std::vector<Direction> directions;
   for (size_t e = 0; e < all.size(); ++e) {
@@ -172,11 +171,11 @@ void AddObjectLight(const image::Photo& photo, DirectionColumns* columns) {
 }
 
 // Patches of the surface as the picture sees them: where a smooth error of the albedo enters the rows.
-std::vector<inference::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const image::Photo& photo,
-                                                    const Eigen::VectorXf& weights,
-                                                    const Eigen::MatrixXf& basis) {
+std::vector<engine::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const image::Photo& photo,
+                                                 const Eigen::VectorXf& weights,
+                                                 const Eigen::MatrixXf& basis) {
   const int side = std::max(kPatchPx / grid.cell, 1);  // cells
-  std::vector<inference::SmoothErrorSite> sites;
+  std::vector<engine::SmoothErrorSite> sites;
   for (int top = 0; top < grid.rows(); top += side)
     for (int left = 0; left < grid.columns(); left += side) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -197,7 +196,7 @@ std::vector<inference::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const 
           if (light > 0) row += light * weights[cell] * basis.row(cell).transpose();
         }
       if (seen < kMinPatch * side * side * grid.cell * grid.cell) continue;
-      inference::SmoothErrorSite site;
+      engine::SmoothErrorSite site;
       site.position_m = sum / seen;
       for (int q = 0; q < row.size(); ++q) site.row_per_m.push_back(row[q]);
       sites.push_back(std::move(site));

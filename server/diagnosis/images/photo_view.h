@@ -15,7 +15,7 @@ struct PhotoRows::View {
   Eigen::VectorXd measured;  // rows
   Eigen::MatrixXd slopes;    // rows x directions that move rays, per SI unit
   Eigen::MatrixXd field;     // rows x functions of the image field
-  std::vector<inference::SmoothErrorSite> sites;
+  std::vector<engine::SmoothErrorSite> sites;
   mutable std::mutex mutex;  // of the workspace
   mutable image::PhotoWorkspace workspace;
 

@@ -7,53 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/inference/parameter_estimate.h"
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/parameter_estimate.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
 #include "server/session/image_set.h"
 
 namespace touchstone::diagnosis::images {
-
-struct GreyQuality {
-  double rmse_grey = 0;  // over all pixels that take part, as a comparison finds it
-  double heldout_rmse_grey =
-      0;  // the same on pictures that the fit did not see: the largest over left-out groups
-  double lack_of_fit_p = 0;  // 0 to 1; of at least this misfit beyond the noise if nothing were missing
-};
-
-// The standard deviation of one pixel among repeats of one picture.
-struct GreyNoiseFloor {
-  double sigma_grey = 0;
-  double lower_grey = 0, upper_grey = 0;  // 95 % interval; 0 if unknown
-  double degrees_of_freedom = 0;
-  bool from_repeats =
-      false;  // false: an upper bound, from what neighbouring pixels of the best model's residuals differ by
-};
-
-// An effect to add, after all earlier ones; fields as in selection::LadderStep.
-struct PhotographStep {
-  std::string effect;
-  selection::EffectScope scope = selection::EffectScope::kRig;
-  std::vector<std::string> equivalent;
-  std::string discriminating_measurement;
-  double probability = 0;
-  double gain_nats = 0;
-  std::vector<inference::ParameterEstimate> parameters;
-  GreyQuality quality;
-  std::optional<selection::Quality> touch_quality;  // of a joint diagnosis
-  std::string shown_by;  // of a joint diagnosis: "touches", "photographs" or "both"
-  model::Model model;
-  std::string meaning, check_on_rig, remedy, words;
-};
-
-struct RankedPhotographCandidate {
-  std::string effect;
-  selection::EffectScope scope = selection::EffectScope::kRig;
-  selection::CandidateNote note = selection::CandidateNote::kNone;
-  double probability = 0, gain_nats = 0;
-  std::vector<inference::ParameterEstimate> parameters;
-  double rmse_grey = 0, heldout_rmse_grey = 0;
-};
 
 // A part of the pictures that holds excess error.
 struct PhotographSlice {
@@ -98,34 +57,22 @@ struct ProposedPhotograph {
   int photographs_to_verdict = 0;  // as design::ProposedTouch::touches_to_verdict
 };
 
-struct UnexplainedPhotographs {
-  std::vector<selection::CovariateTest> covariates;
-  std::string formula, formula_yaml, lookup_yaml, words;
-  double rmse_grey = 0, heldout_rmse_grey = 0, heldout_gain = 0;
-};
-
-struct PhotographDataProblem {
-  // channel_order, mirrored, rotated, units_angle, up_axis, wrong_object, object_names, focal_factor, units_length, row_shift
-  std::string kind, detail, words, fix;
-  double rmse_before_grey = 0, rmse_after_grey = 0;
-};
-
 struct PhotographDiagnosis {
-  selection::Verdict verdict = selection::Verdict::kNone;
+  engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
   int images = 0;  // that took part
   std::vector<std::string> objects;
-  GreyNoiseFloor noise_floor;
-  std::optional<GreyQuality> initial, final;
+  engine::NoiseFloor noise_floor;
+  std::optional<engine::Quality> initial, final;
   double reducible_share = 0;  // of the mean square error that is not noise, 0 to 1
 
-  std::vector<selection::RefittedEffect> refitted;
-  std::vector<PhotographStep> steps;
-  std::vector<RankedPhotographCandidate> candidates;
-  std::vector<selection::ConfoundedEffects> confounded;
+  std::vector<engine::RefittedEffect> refitted;
+  std::vector<engine::LadderStep> steps;
+  std::vector<engine::RankedCandidate> candidates;
+  std::vector<engine::ConfoundedEffects> confounded;
   std::vector<std::string> superfluous;
-  std::vector<PhotographDataProblem> data_problems;
-  std::optional<UnexplainedPhotographs> unexplained;
+  std::vector<engine::DataProblem> data_problems;
+  std::optional<engine::UnexplainedRest> unexplained;
   int images_needed = 0;  // with kTooLittleData
   std::string improved_model_yaml, improved_model_hash;
   std::vector<ProposedPhotograph> next_photographs;

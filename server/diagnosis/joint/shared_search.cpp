@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <numeric>
 
 #include "server/base/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/inference/held_out.h"
+#include "server/diagnosis/engine/held_out.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
@@ -15,32 +15,38 @@ constexpr int kPasses = 2;          // of values and what stands beside them
 constexpr int kMaxTried = 3;        // forms per round, beside those that either kind names by itself
 constexpr double kWorthTrying = 3;  // nats that either kind, or both together, expect of a form
 constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
-constexpr int kMaxShared = 2;       // effects
+constexpr int kMaxShared = 6;       // effects
 
-selection::SearchRules Rules() {
+engine::SearchRules Rules() {
   return {};
 }
 
 // A form of a shared effect with the evidence that each kind expects of it by itself, linearly.
 struct Form {
   SharedEffect effect;
-  std::array<double, 2> gain_nats = {0, 0};
+  std::vector<double> gain_nats;
   bool named = false;  // by the explanation of one kind alone
 
-  double Sum() const { return gain_nats[0] + gain_nats[1]; }
-  bool IsWorthTrying() const { return named || std::max({gain_nats[0], gain_nats[1], Sum()}) > kWorthTrying; }
+  double Sum() const { return std::accumulate(gain_nats.begin(), gain_nats.end(), 0.0); }
+  int GainingKinds() const {
+    return static_cast<int>(
+        std::count_if(gain_nats.begin(), gain_nats.end(), [](double nats) { return nats >= kWorthTrying; }));
+  }
+  bool IsWorthTrying() const {
+    return named || std::max(*std::max_element(gain_nats.begin(), gain_nats.end()), Sum()) > kWorthTrying;
+  }
 };
 
-SharedEffect FormOf(const Side& side, const selection::Extension& extension) {
+SharedEffect FormOf(const Side& side, const engine::Extension& extension) {
   SharedEffect effect;
   if (extension.candidate < 0) {
     effect.given = true;
-    effect.instance = side.given->effects[IndexOf(*side.given, extension.name)];
+    effect.instance = side.given().effects[IndexOf(side.given(), extension.name)];
     return effect;
   }
-  const selection::Candidate& candidate = side.search->candidates()[extension.candidate];
+  const engine::Candidate& candidate = side.search->candidates()[extension.candidate];
   effect.instance.effect = candidate.effect;
-  effect.instance.values = candidate.effect->NeutralValues(side.given->fingers);
+  effect.instance.values = candidate.effect->NeutralValues(side.given().fingers);
   effect.instance.per_object =
       candidate.per_object || candidate.effect->always_per_object || !candidate.object.empty();
   effect.object = candidate.object;
@@ -52,23 +58,26 @@ SharedEffect FormOf(const Side& side, const selection::Extension& extension) {
 absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained& so_far) {
   std::map<std::string, Form> forms;
   for (const Side& side : sides) {
-    const inference::Fit& fit = so_far.fit.fits[side.kind];
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<selection::Extension> extensions,
-                                side.search->Score(fit, static_cast<int>(side.given->effects.size())));
-    for (const selection::Extension& extension : extensions) {
-      const bool shared = extension.candidate >= 0
-                              ? IsShared(*side.search->candidates()[extension.candidate].effect)
-                              : IsShared(*side.given->effects[IndexOf(*side.given, extension.name)].effect);
+    const engine::Fit& fit = so_far.fit.fits[side.kind];
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::Extension> extensions,
+                                side.search->Score(fit, side.initial_effects()));
+    for (const engine::Extension& extension : extensions) {
+      const bool shared =
+          extension.candidate >= 0
+              ? side.is_shared(*side.search->candidates()[extension.candidate].effect)
+              : side.is_shared(*side.given().effects[IndexOf(side.given(), extension.name)].effect);
       if (!shared || !extension.visible) continue;
       const SharedEffect effect = FormOf(side, extension);
-      Form& form = forms.emplace(effect.Key(), Form{effect, {0, 0}, false}).first->second;
+      Form& form =
+          forms.emplace(effect.Key(), Form{effect, std::vector<double>(sides.size()), false}).first->second;
       form.gain_nats[side.kind] = extension.log_evidence - fit.log_evidence;
     }
-    for (const SharedEffect& effect : side.SharedOf(side.alone)) {
+    for (const SharedEffect& effect : side.SharedOf(side.modality->alone())) {
       const bool present = std::any_of(so_far.shared.begin(), so_far.shared.end(),
                                        [&](const SharedEffect& e) { return e.name() == effect.name(); });
       if (present) continue;
-      Form& form = forms.emplace(effect.Key(), Form{effect, {0, 0}, false}).first->second;
+      Form& form =
+          forms.emplace(effect.Key(), Form{effect, std::vector<double>(sides.size()), false}).first->second;
       form.named = true;
       // Where that kind has it is where the joint fit starts.
       form.effect.instance = effect.instance;
@@ -87,15 +96,17 @@ absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained&
 
 // Adds forms that promise nothing only because each kind names effects of its own that do the same: a sag of the tool and a
 // camera that stands lower are, together, objects that lie lower.
-absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::array<OwnEffects, 2>& own,
+absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::vector<OwnEffects>& own,
                                  std::vector<Form>* forms) {
-  if (own[kTouches].size() == 0 || own[kPhotographs].size() == 0) return absl::OkStatus();
+  if (std::count_if(own.begin(), own.end(), [](const OwnEffects& e) { return e.size() > 0; }) < 2)
+    return absl::OkStatus();
   Explained bare;
+  bare.own.resize(sides.size());
   TOUCHSTONE_ASSIGN_OR_RETURN(bare.fit, FitJointly(PartsOf(sides, bare)));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Form> hidden, ListForms(sides, bare));
   for (const Form& form : hidden) {
-    // What only one kind would gain from stands for nothing of the other's.
-    if (std::min(form.gain_nats[kTouches], form.gain_nats[kPhotographs]) < kWorthTrying) continue;
+    // What only one kind would gain from stands for nothing of the others'.
+    if (form.GainingKinds() < 2) continue;
     if (std::none_of(forms->begin(), forms->end(),
                      [&](const Form& other) { return other.effect.Key() == form.effect.Key(); }))
       forms->push_back(form);
@@ -106,8 +117,8 @@ absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::array<OwnEffects
 // Whether one kind, at the joint values, predicts blocks better that were left out.
 bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained& after) {
   for (const Side& side : sides) {
-    const double was = inference::HeldOutRmseByBlock(*side.experiment, before.fit.fits[side.kind]);
-    const double is = inference::HeldOutRmseByBlock(*side.experiment, after.fit.fits[side.kind]);
+    const double was = engine::HeldOutRmseByBlock(side.modality->experiment(), before.fit.fits[side.kind]);
+    const double is = engine::HeldOutRmseByBlock(side.modality->experiment(), after.fit.fits[side.kind]);
     if (is < (1 - Rules().min_relative_cv_gain) * was) return true;
   }
   return false;
@@ -118,7 +129,8 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
   const double gain = after.fit.log_evidence - before.fit.log_evidence;
   // Where it takes the place of what either kind named by itself, nothing is added but one cause put for others.
   int replaced = 0;
-  for (const Kind kind : kKinds) replaced += before.own[kind].size() - after.own[kind].size();
+  for (size_t kind = 0; kind < before.own.size(); ++kind)
+    replaced += before.own[kind].size() - after.own[kind].size();
   // One cause for several needs no more than to explain as much: the several would each have had to be worth its entry.
   if (replaced > 1) return gain > -Rules().equivalent_nats;
   if (replaced > 0)
@@ -136,7 +148,7 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
 
 std::vector<std::string> OwnBeside(const Explained& one, const Explained& other) {
   std::vector<std::string> beside;
-  for (const Kind kind : kKinds) {
+  for (size_t kind = 0; kind < one.own.size(); ++kind) {
     const std::vector<std::string> others = other.own[kind].Names();
     for (const std::string& name : one.own[kind].Names())
       if (std::find(others.begin(), others.end(), name) == others.end()) beside.push_back(name);
@@ -144,15 +156,15 @@ std::vector<std::string> OwnBeside(const Explained& one, const Explained& other)
   return beside;
 }
 
-std::array<Part, 2> PartsOf(const Sides& sides, const Explained& explained) {
-  std::array<Part, 2> parts;
+std::vector<Part> PartsOf(const Sides& sides, const Explained& explained) {
+  std::vector<Part> parts;
   for (const Side& side : sides)
-    parts[side.kind] = {side.experiment, side.Free(explained.shared, explained.own[side.kind]), 1};
+    parts.push_back({&side.modality->experiment(), side.Free(explained.shared, explained.own[side.kind]), 1});
   return parts;
 }
 
 absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                      std::array<OwnEffects, 2> own) {
+                                      std::vector<OwnEffects> own) {
   Explained best{std::move(shared), std::move(own), {}};
   TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -160,7 +172,7 @@ absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffe
     for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
     bool same = true;
     for (const Side& side : sides) {
-      selection::Explanation explanation;
+      engine::Explanation explanation;
       explanation.initial_effects = side.InitialEffects(next.shared);
       explanation.fit.model = side.Held(next.shared, best.own[side.kind]);
       TOUCHSTONE_ASSIGN_OR_RETURN(explanation, side.own_search->Continue(std::move(explanation)));
@@ -177,9 +189,8 @@ absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffe
 }
 
 absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
-  std::array<OwnEffects, 2> own;
-  for (const Side& side : sides)
-    own[side.kind] = side.OwnOf(side.alone, static_cast<int>(side.given->effects.size()));
+  std::vector<OwnEffects> own;
+  for (const Side& side : sides) own.push_back(side.own_alone());
   SharedSelection selection;
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.none, ExplainWith(sides, {}, own));
   selection.best = selection.none;
@@ -193,7 +204,7 @@ absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
       shared.push_back(form.effect);
       TOUCHSTONE_ASSIGN_OR_RETURN(Explained with, ExplainWith(sides, shared, selection.best.own));
       // What either kind shows by itself may have stood in for the effect.
-      for (const std::array<OwnEffects, 2>& start : {own, std::array<OwnEffects, 2>()}) {
+      for (const std::vector<OwnEffects>& start : {own, std::vector<OwnEffects>(sides.size())}) {
         TOUCHSTONE_ASSIGN_OR_RETURN(Explained afresh, ExplainWith(sides, shared, start));
         if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
       }

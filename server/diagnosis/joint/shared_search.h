@@ -1,17 +1,16 @@
 // The search for shared effects, on two sides that are prepared.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "server/diagnosis/joint/side.h"
 
 namespace touchstone::diagnosis::joint {
 
-// Shared effects in some form, with the best that either kind shows beside them.
+// Shared effects in some form, with the best that each kind shows beside them.
 struct Explained {
   std::vector<SharedEffect> shared;  // at the joint values
-  std::array<OwnEffects, 2> own;
+  std::vector<OwnEffects> own;       // by kind
   JointFit fit;
 };
 
@@ -21,17 +20,17 @@ struct SharedSelection {
   std::vector<Explained> tried;  // every other form
 };
 
-// Effects of either kind alone that the one has and the other does not.
+// Effects of one kind alone that the one has and the other does not.
 std::vector<std::string> OwnBeside(const Explained& one, const Explained& other);
 
-using Sides = std::array<Side, 2>;
+using Sides = std::vector<Side>;
 
 // The shared effects, fitted jointly, with whatever each kind shows beside them.
 absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                      std::array<OwnEffects, 2> own);
+                                      std::vector<OwnEffects> own);
 
 absl::StatusOr<SharedSelection> SearchShared(const Sides& sides);
 
-std::array<Part, 2> PartsOf(const Sides& sides, const Explained& explained);
+std::vector<Part> PartsOf(const Sides& sides, const Explained& explained);
 
 }  // namespace touchstone::diagnosis::joint

@@ -1,23 +1,18 @@
-// One kind of data in a joint diagnosis: its rows, what it is explained by without the other kind, and the search for
+// One kind of measurement in a joint diagnosis: its rows, what it is explained by without the others, and the search for
 // what it alone can show once the shared effects are settled.
 #pragma once
 
-#include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "server/diagnosis/engine/modality.h"
 #include "server/diagnosis/joint/joint_fit.h"
-#include "server/diagnosis/selection/stepwise_search.h"
 
 namespace touchstone::diagnosis::joint {
-
-// Effects that move the surface are seen by touch and by camera: object_pose, object_scale.
-inline bool IsShared(const model::Effect& effect) {
-  return effect.moves_surface;
-}
 
 // A shared effect in some form: new, or of the given model with its values set free.
 struct SharedEffect {
@@ -42,30 +37,31 @@ struct OwnEffects {
 };
 
 struct Side {
-  Kind kind = kTouches;
-  std::shared_ptr<const model::Model> given;
-  std::vector<std::string> objects;
-  const inference::Experiment* experiment = nullptr;
-  std::unique_ptr<inference::Experiment> settled;         // the same, shared values held
-  std::unique_ptr<selection::StepwiseSearch> search;      // over every effect
-  std::unique_ptr<selection::StepwiseSearch> own_search;  // over those that only this kind shows
-  inference::Fit alone;                                   // the explanation without the other kind
+  int kind = 0;  // place in the list of modalities
+  const engine::Modality* modality = nullptr;
+  std::function<bool(const model::Effect&)> is_shared;  // seen by several modalities
+  std::unique_ptr<engine::Experiment> settled;          // the modality's, shared values held
+  std::unique_ptr<engine::StepwiseSearch> search;       // over every effect
+  std::unique_ptr<engine::StepwiseSearch> own_search;   // over those that only this kind shows
 
-  // `candidates`: every effect that may be missing.
-  void Prepare(const inference::Experiment& experiment, std::vector<selection::Candidate> candidates);
+  Side(const engine::Modality& modality, int kind, std::function<bool(const model::Effect&)> is_shared);
 
+  const model::Model& given() const { return modality->given(); }
+  int initial_effects() const { return static_cast<int>(given().effects.size()); }
+  // What this kind alone is explained by.
+  OwnEffects own_alone() const { return OwnOf(modality->alone(), initial_effects()); }
   bool HasObject(const std::string& object) const;
   // Everything free: the kind's own effects, then the shared ones.
-  inference::Parameterization Free(const std::vector<SharedEffect>& shared, const OwnEffects& own) const;
+  engine::Parameterization Free(const std::vector<SharedEffect>& shared, const OwnEffects& own) const;
   // The shared effects held at their values.
-  inference::Parameterization Held(const std::vector<SharedEffect>& shared, const OwnEffects& own) const;
+  engine::Parameterization Held(const std::vector<SharedEffect>& shared, const OwnEffects& own) const;
   // The given model's effects, and the shared ones among them.
   int InitialEffects(const std::vector<SharedEffect>& shared) const;
 
   // What an explanation has beyond the first `initial_effects`, and freed among the model's: without shared effects.
-  OwnEffects OwnOf(const inference::Fit& fit, int initial_effects) const;
+  OwnEffects OwnOf(const engine::Fit& fit, int initial_effects) const;
   // The shared effects of an explanation.
-  std::vector<SharedEffect> SharedOf(const inference::Fit& fit) const;
+  std::vector<SharedEffect> SharedOf(const engine::Fit& fit) const;
 };
 
 // A shared effect with the values of a joint fit, of both kinds' objects.

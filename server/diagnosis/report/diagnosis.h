@@ -8,8 +8,8 @@
 
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis::report {
@@ -21,27 +21,27 @@ struct PoseFreeDiagnosis {
 };
 
 struct Diagnosis {
-  selection::Verdict verdict = selection::Verdict::kNone;
+  engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;  // of the initial model
   touches::DataSummary data;
 
   // How wrong; none of them if no touch could be used.
-  std::optional<selection::NoiseFloor> noise_floor;
-  std::optional<selection::Quality> initial;  // the model as it was given
-  std::optional<selection::Quality> final;    // after all steps and refits
-  double reducible_share = 0;                 // of the mean square error that is not noise, 0 to 1
+  std::optional<engine::NoiseFloor> noise_floor;
+  std::optional<engine::Quality> initial;  // the model as it was given
+  std::optional<engine::Quality> final;    // after all steps and refits
+  double reducible_share = 0;              // of the mean square error that is not noise, 0 to 1
 
   // Where.
   residuals::ResidualSummary residuals;
 
   // Why, and what to do.
-  std::vector<selection::RefittedEffect> refitted;
-  std::vector<selection::LadderStep> steps;
-  std::vector<selection::ConfoundedEffects> confounded;
-  std::vector<selection::RankedCandidate> candidates;
-  std::optional<selection::UnexplainedRest> unexplained;
+  std::vector<engine::RefittedEffect> refitted;
+  std::vector<engine::LadderStep> steps;
+  std::vector<engine::ConfoundedEffects> confounded;
+  std::vector<engine::RankedCandidate> candidates;
+  std::optional<engine::UnexplainedRest> unexplained;
   std::vector<std::string> superfluous;                  // effects of the model that the data do without
-  std::vector<selection::DataProblem> data_problems;     // with kCheckData; no step is claimed beside them
+  std::vector<engine::DataProblem> data_problems;        // with kCheckData; no step is claimed beside them
   int touches_needed = 0;                                // with kTooLittleData
   std::string improved_model_yaml, improved_model_hash;  // empty if nothing changed
   std::vector<design::ProposedTouch> next_touches;

@@ -8,8 +8,8 @@
 
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/report/residuals_messages.h"
-#include "server/diagnosis/selection/result.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
@@ -149,7 +149,7 @@ std::string WriteNoiseChange(const distributions::PoseFreeComparison& comparison
   if (is_new) {
     v1::Step* step = report->add_steps();
     step->set_effect(effect->name);
-    step->set_probability(selection::kMaxProbability);
+    step->set_probability(engine::kMaxProbability);
     step->set_scope("rig");
     step->set_lack_of_fit_p(comparison.p_value);
     step->set_meaning(effect->meaning);

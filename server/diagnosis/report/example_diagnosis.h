@@ -7,8 +7,8 @@
 
 namespace touchstone::diagnosis::report {
 
-inline inference::ParameterEstimate RadiusMm() {
-  inference::ParameterEstimate radius;
+inline engine::ParameterEstimate RadiusMm() {
+  engine::ParameterEstimate radius;
   radius.name = "radius_mm";
   radius.value = 2.98;
   radius.std_error = 0.02;
@@ -18,8 +18,8 @@ inline inference::ParameterEstimate RadiusMm() {
   return radius;
 }
 
-inline selection::LadderStep Step(const std::string& effect) {
-  selection::LadderStep step;
+inline engine::LadderStep Step(const std::string& effect) {
+  engine::LadderStep step;
   step.effect = effect;
   step.probability = 0.98;
   step.gain_nats = 1200;
@@ -31,7 +31,7 @@ inline selection::LadderStep Step(const std::string& effect) {
   return step;
 }
 
-inline Diagnosis ExampleDiagnosis(selection::Verdict verdict) {
+inline Diagnosis ExampleDiagnosis(engine::Verdict verdict) {
   Diagnosis diagnosis;
   diagnosis.verdict = verdict;
   diagnosis.model_name = "nominal";
@@ -48,9 +48,9 @@ inline Diagnosis ExampleDiagnosis(selection::Verdict verdict) {
   diagnosis.data.speeds_mm_s = {20};
   diagnosis.data.missed_contacts = 3;
   diagnosis.noise_floor.emplace();
-  diagnosis.noise_floor->sigma_s = 0.005;
-  diagnosis.noise_floor->lower_s = 0.0048;
-  diagnosis.noise_floor->upper_s = 0.0052;
+  diagnosis.noise_floor->sigma = 0.005;
+  diagnosis.noise_floor->lower = 0.0048;
+  diagnosis.noise_floor->upper = 0.0052;
   diagnosis.noise_floor->degrees_of_freedom = 1440;
   diagnosis.noise_floor->from_repeats = true;
   diagnosis.initial = {0.041, 0.0411, 1e-20};

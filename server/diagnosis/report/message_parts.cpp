@@ -2,41 +2,41 @@
 
 namespace touchstone::diagnosis::report {
 
-v1::Report::Verdict ToMessage(selection::Verdict verdict) {
+v1::Report::Verdict ToMessage(engine::Verdict verdict) {
   switch (verdict) {
-    case selection::Verdict::kNone:
+    case engine::Verdict::kNone:
       return v1::Report::VERDICT_UNSPECIFIED;
-    case selection::Verdict::kAdequate:
+    case engine::Verdict::kAdequate:
       return v1::Report::ADEQUATE;
-    case selection::Verdict::kWrongValues:
+    case engine::Verdict::kWrongValues:
       return v1::Report::WRONG_VALUES;
-    case selection::Verdict::kMissingEffects:
+    case engine::Verdict::kMissingEffects:
       return v1::Report::MISSING_EFFECTS;
-    case selection::Verdict::kUnexplained:
+    case engine::Verdict::kUnexplained:
       return v1::Report::UNEXPLAINED;
-    case selection::Verdict::kCheckData:
+    case engine::Verdict::kCheckData:
       return v1::Report::CHECK_DATA;
-    case selection::Verdict::kTooLittleData:
+    case engine::Verdict::kTooLittleData:
       return v1::Report::TOO_LITTLE_DATA;
   }
   return v1::Report::VERDICT_UNSPECIFIED;
 }
 
-const char* ToMessage(selection::EffectScope scope) {
-  return scope == selection::EffectScope::kObject ? "object" : "rig";
+const char* ToMessage(engine::EffectScope scope) {
+  return scope == engine::EffectScope::kObject ? "object" : "rig";
 }
 
-const char* ToMessage(selection::CandidateNote note) {
+const char* ToMessage(engine::CandidateNote note) {
   switch (note) {
-    case selection::CandidateNote::kNone:
+    case engine::CandidateNote::kNone:
       return "";
-    case selection::CandidateNote::kInvisible:
+    case engine::CandidateNote::kInvisible:
       return "this experiment cannot see it";
-    case selection::CandidateNote::kNeutral:
+    case engine::CandidateNote::kNeutral:
       return "fits best where it changes nothing";
-    case selection::CandidateNote::kAtBound:
+    case engine::CandidateNote::kAtBound:
       return "its best value lies at its bound";
-    case selection::CandidateNote::kLinearised:
+    case engine::CandidateNote::kLinearised:
       return "not among the eight most probable; its gain is a linearised prediction";
   }
   return "";

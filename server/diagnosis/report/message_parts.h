@@ -4,19 +4,19 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/inference/parameter_estimate.h"
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/parameter_estimate.h"
+#include "server/diagnosis/engine/result.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::diagnosis::report {
 
-v1::Report::Verdict ToMessage(selection::Verdict verdict);
-const char* ToMessage(selection::EffectScope scope);
-const char* ToMessage(selection::CandidateNote note);
+v1::Report::Verdict ToMessage(engine::Verdict verdict);
+const char* ToMessage(engine::EffectScope scope);
+const char* ToMessage(engine::CandidateNote note);
 
 template <typename Message>
-void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters, Message* message) {
-  for (const inference::ParameterEstimate& estimate : parameters) {
+void WriteParameters(const std::vector<engine::ParameterEstimate>& parameters, Message* message) {
+  for (const engine::ParameterEstimate& estimate : parameters) {
     v1::ParameterValue* value = message->add_parameters();
     value->set_name(estimate.name);
     value->set_value(estimate.value);
@@ -27,8 +27,9 @@ void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters
     value->set_lower(estimate.lower);
     value->set_upper(estimate.upper);
     if (estimate.before) value->set_before(*estimate.before);
-    if (estimate.std_error_touches) value->set_std_error_touches(*estimate.std_error_touches);
-    if (estimate.std_error_photographs) value->set_std_error_photographs(*estimate.std_error_photographs);
+    for (const auto& [kind, std_error] : estimate.std_error_alone)
+      kind == "touches" ? value->set_std_error_touches(std_error)
+                        : value->set_std_error_photographs(std_error);
   }
 }
 
@@ -63,7 +64,7 @@ void WriteCandidateWithoutErrors(const Candidate& candidate, v1::Candidate* mess
 // The same of what no effect explains: what it depends on, and what is suggested.
 template <typename Rest>
 void WriteRestWithoutErrors(const Rest& rest, v1::Unexplained* message) {
-  for (const selection::CovariateTest& test : rest.covariates) {
+  for (const engine::CovariateTest& test : rest.covariates) {
     v1::CovariateTest* covariate = message->add_covariates();
     covariate->set_name(test.name);
     covariate->set_p(test.p);
@@ -88,12 +89,12 @@ void WriteProblemWithoutErrors(const Problem& problem, v1::DataProblem* message)
 // Of a diagnosis: refitted values, effects that cannot be told apart, superfluous ones, the improved model.
 template <typename AnyDiagnosis>
 void WriteModelChanges(const AnyDiagnosis& diagnosis, v1::Report* report) {
-  for (const selection::RefittedEffect& refit : diagnosis.refitted) {
+  for (const engine::RefittedEffect& refit : diagnosis.refitted) {
     v1::Refit* message = report->add_refitted();
     message->set_effect(refit.effect);
     WriteParameters(refit.parameters, message);
   }
-  for (const selection::ConfoundedEffects& confounded : diagnosis.confounded) {
+  for (const engine::ConfoundedEffects& confounded : diagnosis.confounded) {
     v1::Ambiguity* message = report->add_ambiguities();
     for (const std::string& effect : confounded.effects) message->add_effects(effect);
     message->set_discriminating_measurement(confounded.discriminating_measurement);

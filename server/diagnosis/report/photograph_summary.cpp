@@ -19,37 +19,35 @@ std::string Grey(double grey) {
 }
 
 std::string HowWrongInGrey(const images::PhotographDiagnosis& diagnosis) {
-  const double rmse = diagnosis.initial ? diagnosis.initial->rmse_grey : 0;
-  if (!(diagnosis.noise_floor.sigma_grey > 0)) return absl::StrCat("The model is off by ", Grey(rmse), ".");
+  const double rmse = diagnosis.initial ? diagnosis.initial->rmse : 0;
+  if (!(diagnosis.noise_floor.sigma > 0)) return absl::StrCat("The model is off by ", Grey(rmse), ".");
   return absl::StrFormat(
       "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
-      Grey(rmse), Grey(diagnosis.noise_floor.sigma_grey),
-      diagnosis.noise_floor.from_repeats ? "" : " at most", diagnosis.reducible_share * 100);
+      Grey(rmse), Grey(diagnosis.noise_floor.sigma), diagnosis.noise_floor.from_repeats ? "" : " at most",
+      diagnosis.reducible_share * 100);
 }
 
-std::string RestInWords(const images::UnexplainedPhotographs& rest) {
+std::string RestInWords(const engine::UnexplainedRest& rest) {
   std::string text = "What remains follows no effect of the catalogue";
   if (!rest.covariates.empty()) absl::StrAppend(&text, "; it depends on ", rest.covariates[0].name);
   if (!rest.formula.empty())
-    absl::StrAppend(&text, ". A suggestion: ", rest.formula, " would leave ", Grey(rest.rmse_grey));
+    absl::StrAppend(&text, ". A suggestion: ", rest.formula, " would leave ", Grey(rest.rmse));
   else if (!rest.lookup_yaml.empty())
-    absl::StrAppend(&text, " along a curve that would leave ", Grey(rest.rmse_grey));
+    absl::StrAppend(&text, " along a curve that would leave ", Grey(rest.rmse));
   return absl::StrCat(text, ".", rest.words.empty() ? "" : " ", rest.words);
 }
 
 void AddSteps(const images::PhotographDiagnosis& diagnosis, std::vector<std::string>* sentences) {
-  for (const selection::RefittedEffect& refit : diagnosis.refitted)
+  for (const engine::RefittedEffect& refit : diagnosis.refitted)
     sentences->push_back(absl::StrCat("In the model ", refit.effect,
                                       " has another value: ", ValuesInWords(refit.parameters), "."));
   for (const std::string& effect : diagnosis.superfluous)
     sentences->push_back(absl::StrCat("The data do without ", effect, " (`touchstone model remove MODEL ",
                                       effect, " -o NEW`)."));
-  for (const images::PhotographStep& step : diagnosis.steps) {
+  for (const engine::LadderStep& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
     sentences->push_back(absl::StrCat("Missing: ", name, " (", ValuesInWords(step.parameters), ")."));
-    if (step.shown_by == "touches" || step.shown_by == "photographs")
-      sentences->push_back(absl::StrCat("Only the ", step.shown_by, " show it."));
     if (!step.equivalent.empty())
       sentences->push_back(
           absl::StrCat("These pictures cannot tell them apart. ", step.discriminating_measurement));
@@ -64,30 +62,30 @@ std::string Summarize(const images::PhotographDiagnosis& diagnosis, bool others_
   std::vector<std::string> sentences = {HowWrongInGrey(diagnosis)};
   AddSteps(diagnosis, &sentences);
   switch (diagnosis.verdict) {
-    case selection::Verdict::kAdequate:
+    case engine::Verdict::kAdequate:
       sentences.push_back(absl::StrCat("Nothing ", others_in_place ? "else " : "",
                                        "is missing that these pictures could show."));
       break;
-    case selection::Verdict::kUnexplained:
+    case engine::Verdict::kUnexplained:
       sentences.push_back(diagnosis.unexplained
                               ? RestInWords(*diagnosis.unexplained)
                               : "A structure remains that no effect of the catalogue explains.");
       break;
-    case selection::Verdict::kMissingEffects:
-    case selection::Verdict::kWrongValues:
+    case engine::Verdict::kMissingEffects:
+    case engine::Verdict::kWrongValues:
       if (diagnosis.final)
-        sentences.push_back(absl::StrCat("Then ", Grey(diagnosis.final->rmse_grey), " is left."));
+        sentences.push_back(absl::StrCat("Then ", Grey(diagnosis.final->rmse), " is left."));
       break;
-    case selection::Verdict::kCheckData:
-      for (const images::PhotographDataProblem& problem : diagnosis.data_problems)
+    case engine::Verdict::kCheckData:
+      for (const engine::DataProblem& problem : diagnosis.data_problems)
         sentences.push_back(
             absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
       break;
-    case selection::Verdict::kTooLittleData:
+    case engine::Verdict::kTooLittleData:
       sentences.push_back(absl::StrCat("That is too little for a verdict; pictures from ",
                                        diagnosis.images_needed, " poses would do."));
       break;
-    case selection::Verdict::kNone:
+    case engine::Verdict::kNone:
       break;
   }
   return absl::StrJoin(sentences, " ");

@@ -9,7 +9,7 @@
 namespace touchstone::diagnosis::report {
 
 // "radius_mm 1.5 +- 0.005 mm, ..."; only how many where they are many.
-std::string ValuesInWords(const std::vector<inference::ParameterEstimate>& parameters);
+std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& parameters);
 
 // What limits the diagnosis: few objects, no repeats, few touches.
 std::vector<std::string> DataWarnings(const touches::DataSummary& data);

@@ -9,7 +9,7 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-using selection::Verdict;
+using engine::Verdict;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
@@ -33,14 +33,14 @@ TEST(Summarize, CallsAFloorWithoutRepeatsAnUpperBound) {
 
 TEST(Summarize, SaysThatRepeatsScatterByMoreThanTheModelSays) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
-  selection::NoiseFloor& floor = *diagnosis.noise_floor;
-  floor.sigma_s = 0.013, floor.lower_s = 0.0125, floor.upper_s = 0.0135;
+  engine::NoiseFloor& floor = *diagnosis.noise_floor;
+  floor.sigma = 0.013, floor.lower = 0.0125, floor.upper = 0.0135;
   floor.from_repeats = true;
   EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
-  floor.declared_s = 0.005;
+  floor.declared = 0.005;
   EXPECT_THAT(Summarize(diagnosis),
               HasSubstr("Repeats scatter by 13 ms (12.5 ms to 13.5 ms), where the model says 5 ms of noise"));
-  floor.declared_s = 0.0133;
+  floor.declared = 0.0133;
   EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
 }
 
@@ -53,7 +53,7 @@ TEST(Summarize, CallsNoiseThatIsNotThereSuperfluous) {
 
 TEST(Summarize, WithoutNoiseGivesTheErrorAlone) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kNone);
-  diagnosis.noise_floor->sigma_s = 0;
+  diagnosis.noise_floor->sigma = 0;
   EXPECT_EQ(Summarize(diagnosis), "The model is off by 41 ms.");
 }
 
@@ -117,7 +117,7 @@ TEST(Summarize, SuggestsAFormulaForWhatNoEffectExplains) {
   diagnosis.unexplained.emplace();
   diagnosis.unexplained->covariates = {{"travel_mm", 1e-9, 80}};
   diagnosis.unexplained->formula = "k * sin(2*pi*travel_mm/lead)";
-  diagnosis.unexplained->rmse_s = 0.007;
+  diagnosis.unexplained->rmse = 0.007;
   const std::string summary = Summarize(diagnosis);
   EXPECT_THAT(summary, HasSubstr("depends on travel_mm"));
   EXPECT_THAT(summary, HasSubstr("A suggestion: k * sin(2*pi*travel_mm/lead)"));

@@ -19,7 +19,7 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-using selection::Verdict;
+using engine::Verdict;
 
 // Worse ones later.
 int RankOf(Verdict verdict) {
@@ -61,7 +61,7 @@ std::string NameOf(Verdict verdict) {
 
 std::string ErrorsInWords(const JointQuality& quality) {
   return absl::StrFormat("%.3g ms on touches and %.3g grey levels on photographs",
-                         Microseconds(quality.touches.rmse_s) / 1000, quality.photographs.rmse_grey);
+                         Microseconds(quality.touches.rmse) / 1000, quality.photographs.rmse);
 }
 
 // Of a mean square error, what is not noise.
@@ -72,11 +72,12 @@ double ShareBeyond(double rmse, double floor) {
 // Of the value that gains most by the other kind.
 std::string TighterInWords(const joint::SharedStep& step) {
   double than_touches = 0, than_photographs = 0;
-  for (const inference::ParameterEstimate& e : step.parameters) {
+  for (const engine::ParameterEstimate& e : step.parameters) {
     if (!(e.std_error > 0)) continue;
-    if (e.std_error_touches) than_touches = std::max(than_touches, *e.std_error_touches / e.std_error);
-    if (e.std_error_photographs)
-      than_photographs = std::max(than_photographs, *e.std_error_photographs / e.std_error);
+    for (const auto& [kind, std_error] : e.std_error_alone) {
+      double& than = kind == "touches" ? than_touches : than_photographs;
+      than = std::max(than, std_error / e.std_error);
+    }
   }
   if (!(than_touches > 0) || !(than_photographs > 0)) return "";
   return absl::StrFormat(
@@ -94,7 +95,7 @@ std::string ConflictInWords(const joint::Conflict& conflict) {
       "between "
       "touching and photographing, or each kind has something else that its own data take for %s. Nothing is "
       "claimed.",
-      conflict.effect, ValuesInWords(conflict.touches), ValuesInWords(conflict.photographs),
+      conflict.effect, ValuesInWords(conflict.values[0]), ValuesInWords(conflict.values[1]),
       std::max(conflict.p, 1e-300), conflict.effect);
 }
 
@@ -103,10 +104,10 @@ void WriteSharedStep(const joint::SharedStep& step, const JointQuality& quality,
   for (const std::string& name : step.equivalent) message->add_equivalent(name);
   message->set_probability(step.probability);
   WriteParameters(step.parameters, message);
-  message->set_rmse_us(Microseconds(quality.touches.rmse_s));
-  message->set_heldout_rmse_us(Microseconds(quality.touches.heldout_rmse_s));
-  message->set_rmse_grey(quality.photographs.rmse_grey);
-  message->set_heldout_rmse_grey(quality.photographs.heldout_rmse_grey);
+  message->set_rmse_us(Microseconds(quality.touches.rmse));
+  message->set_heldout_rmse_us(Microseconds(quality.touches.heldout_rmse));
+  message->set_rmse_grey(quality.photographs.rmse);
+  message->set_heldout_rmse_grey(quality.photographs.heldout_rmse);
   message->set_lack_of_fit_p(std::min(quality.touches.lack_of_fit_p, quality.photographs.lack_of_fit_p));
   message->set_shown_by(step.shown_by);
   message->set_gain_nats(step.gain_nats);
@@ -142,20 +143,19 @@ void MergeUnexplained(const v1::Unexplained& touches, const v1::Unexplained& pho
 
 void WriteInitialAndFinal(const JointDiagnosis& d, v1::Report* report) {
   v1::Quality* initial = report->mutable_initial();
-  initial->set_rmse_us(Microseconds(d.initial.touches.rmse_s));
-  initial->set_heldout_rmse_us(Microseconds(d.initial.touches.heldout_rmse_s));
-  initial->set_rmse_grey(d.initial.photographs.rmse_grey);
-  initial->set_heldout_rmse_grey(d.initial.photographs.heldout_rmse_grey);
+  initial->set_rmse_us(Microseconds(d.initial.touches.rmse));
+  initial->set_heldout_rmse_us(Microseconds(d.initial.touches.heldout_rmse));
+  initial->set_rmse_grey(d.initial.photographs.rmse);
+  initial->set_heldout_rmse_grey(d.initial.photographs.heldout_rmse);
   initial->set_lack_of_fit_p(std::min(d.initial.touches.lack_of_fit_p, d.initial.photographs.lack_of_fit_p));
   v1::Quality* final = report->mutable_final();
   if (d.touches.final) {
-    final->set_rmse_us(Microseconds(d.touches.final->rmse_s));
-    final->set_heldout_rmse_us(Microseconds(d.touches.final->heldout_rmse_s * d.shared.heldout_ratio));
+    final->set_rmse_us(Microseconds(d.touches.final->rmse));
+    final->set_heldout_rmse_us(Microseconds(d.shared.heldout[0].Of(d.touches.final->heldout_rmse)));
   }
   if (d.photographs.final) {
-    const double unseen = d.photographs.final->heldout_rmse_grey;
-    final->set_rmse_grey(d.photographs.final->rmse_grey);
-    final->set_heldout_rmse_grey(std::sqrt(unseen * unseen + d.shared.heldout_excess_grey2));
+    final->set_rmse_grey(d.photographs.final->rmse);
+    final->set_heldout_rmse_grey(d.shared.heldout[1].Of(d.photographs.final->heldout_rmse));
   }
   if (d.touches.final && d.photographs.final)
     final->set_lack_of_fit_p(std::min(d.touches.final->lack_of_fit_p, d.photographs.final->lack_of_fit_p));
@@ -169,7 +169,7 @@ void AddUndecided(const JointDiagnosis& d, v1::Step* step) {
       step->add_equivalent(undecided.effect);
       if (step->discriminating_measurement().empty())
         step->set_discriminating_measurement(
-            selection::DiscriminatingMeasurement({step->effect(), undecided.effect}));
+            engine::DiscriminatingMeasurement({step->effect(), undecided.effect}));
     }
 }
 
@@ -193,17 +193,16 @@ void WriteSteps(const JointDiagnosis& d, const std::vector<v1::Step>& touches,
     *message = step;
     message->set_shown_by("touches");
     AddUndecided(d, message);
-    message->set_heldout_rmse_us(step.heldout_rmse_us() * d.shared.heldout_ratio);
-    message->set_rmse_grey(so_far.photographs.rmse_grey);
-    message->set_heldout_rmse_grey(so_far.photographs.heldout_rmse_grey);
+    message->set_heldout_rmse_us(d.shared.heldout[0].Of(step.heldout_rmse_us()));
+    message->set_rmse_grey(so_far.photographs.rmse);
+    message->set_heldout_rmse_grey(so_far.photographs.heldout_rmse);
   }
   for (const v1::Step& step : photographs) {
     v1::Step* message = report->add_steps();
     *message = step;
     message->set_shown_by("photographs");
     AddUndecided(d, message);
-    const double unseen = step.heldout_rmse_grey();
-    message->set_heldout_rmse_grey(std::sqrt(unseen * unseen + d.shared.heldout_excess_grey2));
+    message->set_heldout_rmse_grey(d.shared.heldout[1].Of(step.heldout_rmse_grey()));
     message->set_rmse_us(report->final().rmse_us());
     message->set_heldout_rmse_us(report->final().heldout_rmse_us());
   }
@@ -283,8 +282,8 @@ v1::Report ToJointReport(const JointDiagnosis& d, const session::ImageSet& set) 
   report.set_verdict(ToMessage(WorseOf(VerdictOfTouches(d), VerdictOfPhotographs(d))));
   report.set_touches_needed(std::max(touches_needed, report.touches_needed()));
   report.set_reducible_share(std::max(
-      ShareBeyond(d.initial.photographs.rmse_grey, d.photographs.noise_floor.sigma_grey),
-      ShareBeyond(d.initial.touches.rmse_s, d.touches.noise_floor ? d.touches.noise_floor->sigma_s : 0)));
+      ShareBeyond(d.initial.photographs.rmse, d.photographs.noise_floor.sigma),
+      ShareBeyond(d.initial.touches.rmse, d.touches.noise_floor ? d.touches.noise_floor->sigma : 0)));
   report.set_summary(SummarizeJointly(d));
   report.set_duration_s(d.touches.duration_s + d.photographs.duration_s);
   return report;

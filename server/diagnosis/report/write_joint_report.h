@@ -13,8 +13,8 @@ namespace touchstone::diagnosis::report {
 
 // What one model leaves of both kinds of data.
 struct JointQuality {
-  selection::Quality touches;
-  images::GreyQuality photographs;
+  engine::Quality touches;
+  engine::Quality photographs;
 };
 
 struct JointDiagnosis {

@@ -13,45 +13,40 @@ namespace {
 constexpr double kMinScaleGrey = 8;    // of residual maps
 constexpr double kScaleShare = 0.995;  // of the pixels that the scale covers
 
-void WriteGreyQuality(const images::GreyQuality& quality, v1::Quality* message) {
-  message->set_rmse_grey(quality.rmse_grey);
-  message->set_heldout_rmse_grey(quality.heldout_rmse_grey);
+void WriteGreyQuality(const engine::Quality& quality, v1::Quality* message) {
+  message->set_rmse_grey(quality.rmse);
+  message->set_heldout_rmse_grey(quality.heldout_rmse);
   message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
-void WritePhotographStep(const images::PhotographStep& step, v1::Step* message) {
+void WritePhotographStep(const engine::LadderStep& step, v1::Step* message) {
   WriteStepWithoutErrors(step, message);
-  message->set_rmse_grey(step.quality.rmse_grey);
-  message->set_heldout_rmse_grey(step.quality.heldout_rmse_grey);
-  if (step.touch_quality) {
-    message->set_rmse_us(Microseconds(step.touch_quality->rmse_s));
-    message->set_heldout_rmse_us(Microseconds(step.touch_quality->heldout_rmse_s));
-  }
-  message->set_shown_by(step.shown_by);
+  message->set_rmse_grey(step.quality.rmse);
+  message->set_heldout_rmse_grey(step.quality.heldout_rmse);
 }
 
-void WriteUnexplainedPhotographs(const images::UnexplainedPhotographs& rest, v1::Unexplained* message) {
+void WriteUnexplainedPhotographs(const engine::UnexplainedRest& rest, v1::Unexplained* message) {
   WriteRestWithoutErrors(rest, message);
-  message->set_rmse_grey(rest.rmse_grey);
-  message->set_heldout_rmse_grey(rest.heldout_rmse_grey);
+  message->set_rmse_grey(rest.rmse);
+  message->set_heldout_rmse_grey(rest.heldout_rmse);
 }
 
 void WritePhotographCauses(const images::PhotographDiagnosis& diagnosis, v1::Report* report) {
   WriteModelChanges(diagnosis, report);
-  for (const images::PhotographStep& step : diagnosis.steps) WritePhotographStep(step, report->add_steps());
-  for (const images::RankedPhotographCandidate& candidate : diagnosis.candidates) {
+  for (const engine::LadderStep& step : diagnosis.steps) WritePhotographStep(step, report->add_steps());
+  for (const engine::RankedCandidate& candidate : diagnosis.candidates) {
     v1::Candidate* message = report->add_candidates();
     WriteCandidateWithoutErrors(candidate, message);
-    message->set_rmse_grey(candidate.rmse_grey);
-    message->set_heldout_rmse_grey(candidate.heldout_rmse_grey);
+    message->set_rmse_grey(candidate.rmse);
+    message->set_heldout_rmse_grey(candidate.heldout_rmse);
   }
   if (diagnosis.unexplained)
     WriteUnexplainedPhotographs(*diagnosis.unexplained, report->mutable_unexplained());
-  for (const images::PhotographDataProblem& problem : diagnosis.data_problems) {
+  for (const engine::DataProblem& problem : diagnosis.data_problems) {
     v1::DataProblem* message = report->add_data_problems();
     WriteProblemWithoutErrors(problem, message);
-    message->set_rmse_before_grey(problem.rmse_before_grey);
-    message->set_rmse_after_grey(problem.rmse_after_grey);
+    message->set_rmse_before_grey(problem.error_before);
+    message->set_rmse_after_grey(problem.error_after);
   }
 }
 
@@ -124,7 +119,7 @@ void WriteWherePhotographs(const images::PhotographDiagnosis& diagnosis, v1::Rep
 // Pictures by object, from what they have one by one.
 void WriteObjectGroups(const images::PhotographDiagnosis& diagnosis, v1::Report* report) {
   if (diagnosis.objects.size() < 2) return;
-  const double noise = diagnosis.noise_floor.sigma_grey * diagnosis.noise_floor.sigma_grey;
+  const double noise = diagnosis.noise_floor.sigma * diagnosis.noise_floor.sigma;
   double all = 0;
   for (const images::PhotographError& error : diagnosis.photographs)
     all += error.rmse_grey * error.rmse_grey - noise;
@@ -188,11 +183,11 @@ void WritePhotographs(const images::PhotographDiagnosis& diagnosis, const sessio
   report->set_model_name(diagnosis.model_name);
   report->set_model_hash(diagnosis.model_hash);
   report->set_images(static_cast<uint32_t>(diagnosis.images));
-  report->set_noise_floor_grey(diagnosis.noise_floor.sigma_grey);
+  report->set_noise_floor_grey(diagnosis.noise_floor.sigma);
   v1::NoiseFloor* floor = report->mutable_noise_floor();
-  floor->set_sigma_grey(diagnosis.noise_floor.sigma_grey);
-  floor->set_lower_grey(diagnosis.noise_floor.lower_grey);
-  floor->set_upper_grey(diagnosis.noise_floor.upper_grey);
+  floor->set_sigma_grey(diagnosis.noise_floor.sigma);
+  floor->set_lower_grey(diagnosis.noise_floor.lower);
+  floor->set_upper_grey(diagnosis.noise_floor.upper);
   if (report->touches() == 0) {
     floor->set_from_repeats(diagnosis.noise_floor.from_repeats);
     floor->set_degrees_of_freedom(
@@ -220,7 +215,7 @@ void WritePhotographs(const images::PhotographDiagnosis& diagnosis, const sessio
   report->set_summary(diagnosis.summary);
   for (const std::string& warning : diagnosis.warnings) report->add_warnings(warning);
   report->set_duration_s(diagnosis.duration_s);
-  if (diagnosis.verdict == selection::Verdict::kTooLittleData)
+  if (diagnosis.verdict == engine::Verdict::kTooLittleData)
     report->set_touches_needed(static_cast<uint32_t>(diagnosis.images_needed));
 }
 

@@ -11,30 +11,30 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-void WriteQuality(const selection::Quality& quality, v1::Quality* message) {
-  message->set_rmse_us(Microseconds(quality.rmse_s));
-  message->set_heldout_rmse_us(Microseconds(quality.heldout_rmse_s));
+void WriteQuality(const engine::Quality& quality, v1::Quality* message) {
+  message->set_rmse_us(Microseconds(quality.rmse));
+  message->set_heldout_rmse_us(Microseconds(quality.heldout_rmse));
   message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
-void WriteNoiseFloor(const selection::NoiseFloor& floor, v1::NoiseFloor* message) {
-  message->set_sigma_us(Microseconds(floor.sigma_s));
-  message->set_lower_us(Microseconds(floor.lower_s));
-  message->set_upper_us(Microseconds(floor.upper_s));
+void WriteNoiseFloor(const engine::NoiseFloor& floor, v1::NoiseFloor* message) {
+  message->set_sigma_us(Microseconds(floor.sigma));
+  message->set_lower_us(Microseconds(floor.lower));
+  message->set_upper_us(Microseconds(floor.upper));
   message->set_degrees_of_freedom(static_cast<uint32_t>(floor.degrees_of_freedom));
   message->set_from_repeats(floor.from_repeats);
 }
 
-void WriteStep(const selection::LadderStep& step, v1::Step* message) {
+void WriteStep(const engine::LadderStep& step, v1::Step* message) {
   WriteStepWithoutErrors(step, message);
-  message->set_rmse_us(Microseconds(step.quality.rmse_s));
-  message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(step.quality.rmse));
+  message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse));
 }
 
-void WriteCandidate(const selection::RankedCandidate& candidate, v1::Candidate* message) {
+void WriteCandidate(const engine::RankedCandidate& candidate, v1::Candidate* message) {
   WriteCandidateWithoutErrors(candidate, message);
-  message->set_rmse_us(Microseconds(candidate.rmse_s));
-  message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(candidate.rmse));
+  message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse));
 }
 
 void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) {
@@ -51,11 +51,11 @@ void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) 
   }
 }
 
-void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* message) {
+void WriteUnexplained(const engine::UnexplainedRest& rest, v1::Unexplained* message) {
   WriteRestWithoutErrors(rest, message);
   WriteParameters(rest.parameters, message);
-  message->set_rmse_us(Microseconds(rest.rmse_s));
-  message->set_heldout_rmse_us(Microseconds(rest.heldout_rmse_s));
+  message->set_rmse_us(Microseconds(rest.rmse));
+  message->set_heldout_rmse_us(Microseconds(rest.heldout_rmse));
   message->set_nearest_effect(rest.nearest_effect);
   message->set_nearest_cosine(rest.nearest_cosine);
   message->set_nearest_formula(rest.nearest_formula);
@@ -63,10 +63,10 @@ void WriteUnexplained(const selection::UnexplainedRest& rest, v1::Unexplained* m
   if (rest.lookup != nullptr) WriteCurve(*rest.lookup->lookup, message->mutable_curve());
 }
 
-void WriteDataProblem(const selection::DataProblem& problem, v1::DataProblem* message) {
+void WriteDataProblem(const engine::DataProblem& problem, v1::DataProblem* message) {
   WriteProblemWithoutErrors(problem, message);
-  message->set_rmse_before_us(Microseconds(problem.rmse_before_s));
-  message->set_rmse_after_us(Microseconds(problem.rmse_after_s));
+  message->set_rmse_before_us(Microseconds(problem.error_before));
+  message->set_rmse_after_us(Microseconds(problem.error_after));
 }
 
 void WriteData(const touches::DataSummary& data, v1::Report* report) {
@@ -93,8 +93,8 @@ void WriteData(const touches::DataSummary& data, v1::Report* report) {
 
 void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
   WriteModelChanges(diagnosis, report);
-  for (const selection::LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
-  for (const selection::RankedCandidate& candidate : diagnosis.candidates)
+  for (const engine::LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
+  for (const engine::RankedCandidate& candidate : diagnosis.candidates)
     WriteCandidate(candidate, report->add_candidates());
   if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
 }
@@ -117,7 +117,7 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   report.set_reducible_share(diagnosis.reducible_share);
   WriteResiduals(diagnosis.residuals, diagnosis.data.fingers, &report);
   WriteCauses(diagnosis, &report);
-  for (const selection::DataProblem& problem : diagnosis.data_problems)
+  for (const engine::DataProblem& problem : diagnosis.data_problems)
     WriteDataProblem(problem, report.add_data_problems());
   report.set_touches_needed(static_cast<uint32_t>(diagnosis.touches_needed));
   for (const design::ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);

@@ -8,7 +8,7 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-using selection::Verdict;
+using engine::Verdict;
 using testing::ElementsAre;
 
 TEST(ToReport, GivesTimesInMicroseconds) {
@@ -105,7 +105,7 @@ TEST(ToReport, KeepsTheOrderOfStepsAndTheirEquivalents) {
   diagnosis.steps = {Step("speed_error"), Step("object_pose")};
   diagnosis.steps[0].equivalent = {"clock_skew", "contact_slowdown"};
   diagnosis.steps[0].discriminating_measurement = "Touch at two speeds.";
-  diagnosis.steps[1].scope = selection::EffectScope::kObject;
+  diagnosis.steps[1].scope = engine::EffectScope::kObject;
   diagnosis.steps[1].words = "on lat20 only";
   diagnosis.steps[1].parameters[0].object = "lat20";
   diagnosis.steps[1].parameters[0].entry = "x";
@@ -138,12 +138,12 @@ TEST(ToReport, GivesARefitWithTheValueBefore) {
 
 TEST(ToReport, SaysWhyACandidateIsOut) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
-  selection::RankedCandidate fitted, invisible;
+  engine::RankedCandidate fitted, invisible;
   fitted.effect = "tip_radius";
   fitted.probability = 0.9;
-  fitted.rmse_s = 0.005;
+  fitted.rmse = 0.005;
   invisible.effect = "clock_skew";
-  invisible.note = selection::CandidateNote::kInvisible;
+  invisible.note = engine::CandidateNote::kInvisible;
   diagnosis.candidates = {fitted, invisible};
   const v1::Report report = ToReport(diagnosis);
   ASSERT_EQ(report.candidates_size(), 2);
@@ -160,8 +160,8 @@ TEST(ToReport, HasWhatNoEffectExplains) {
   diagnosis.unexplained->formula_yaml = "- formula: {}\n";
   diagnosis.unexplained->lookup_yaml = "- lookup: {}\n";
   diagnosis.unexplained->words = "From touch 480 on finger l travels 0.25 mm farther.";
-  diagnosis.unexplained->rmse_s = 0.007;
-  diagnosis.unexplained->heldout_rmse_s = 0.0075;
+  diagnosis.unexplained->rmse = 0.007;
+  diagnosis.unexplained->heldout_rmse = 0.0075;
   diagnosis.unexplained->heldout_gain = 0.8;
   diagnosis.unexplained->nearest_effect = "gravity_sag";
   diagnosis.unexplained->nearest_cosine = 0.3;

@@ -123,7 +123,7 @@ void DescribePhotographs(const images::Expectation& expectation, uint64_t seed, 
   const std::vector<ResidualCovariate> covariates =
       ListPixelCovariates(photographs, expectation.before, pool);
   diagnosis->where =
-      FindPhotographSlices(photographs, expectation.before, covariates, diagnosis->noise_floor.sigma_grey);
+      FindPhotographSlices(photographs, expectation.before, covariates, diagnosis->noise_floor.sigma);
   diagnosis->curves =
       PhotographCurves(photographs, expectation.before, expectation.after, covariates, seed, pool);
   diagnosis->maps.clear();

@@ -25,7 +25,7 @@ constexpr double kDroppedNats = 15;  // that it must be better by for each named
 
 // A fit of named effects, and a curve over it.
 struct WithCurve {
-  inference::Fit fit;
+  engine::Fit fit;
   NamelessCurve curve;
   double total() const { return fit.log_evidence + curve.gain_nats; }
 };
@@ -43,7 +43,7 @@ class Competition {
   absl::Status Run() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool partial, IsPartial());
     if (partial) return absl::OkStatus();
-    inference::Fit named = result_.without_formula;
+    engine::Fit named = result_.without_formula;
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(named, ""));
     TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named));
     std::vector<WithCurve> found;
@@ -66,7 +66,7 @@ class Competition {
   }
 
  private:
-  absl::StatusOr<std::vector<NamelessCurve>> CurvesOver(const inference::Fit& fit,
+  absl::StatusOr<std::vector<NamelessCurve>> CurvesOver(const engine::Fit& fit,
                                                         const std::string& only) const {
     if (workspace_.experiment.cancelled && workspace_.experiment.cancelled())
       return absl::CancelledError("the diagnosis was cancelled");
@@ -78,13 +78,13 @@ class Competition {
   // An offset that a part of the touches has, in the place of constants and drifts of each finger.
   absl::StatusOr<bool> IsPartial() {
     if (result_.formula >= 0) return false;
-    inference::Parameterization rest = result_.fit.model;
+    engine::Parameterization rest = result_.fit.model;
     for (int index = static_cast<int>(rest.base().effects.size()) - 1; index >= result_.initial_effects;
          --index)
       if (IsPerFinger(*rest.base().effects[index].effect)) rest = rest.Without(index);
-    inference::Fit fit = result_.fit;
+    engine::Fit fit = result_.fit;
     if (rest.base().effects.size() < fit.model.base().effects.size()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(fit, inference::FitModel(workspace_.experiment, std::move(rest)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(fit, engine::FitModel(workspace_.experiment, std::move(rest)));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.searched_predictor->Run(fit.model.base(), false, false));
@@ -97,7 +97,7 @@ class Competition {
 
   // A curve of time (of the previous press, for effects of that) in the place of named effects: of all together, then
   // of each. A constant per finger may be the mean of a course, a drift its trend.
-  absl::Status ReplaceOvertaken(inference::Fit* named) {
+  absl::Status ReplaceOvertaken(engine::Fit* named) {
     std::vector<int> steps;
     for (int index = result_.initial_effects; index < static_cast<int>(named->model.base().effects.size());
          ++index)
@@ -127,7 +127,7 @@ class Competition {
   }
 
   // A wander's mean and trend look like a constant and a drift of each finger.
-  absl::Status NoteWander(int index, const inference::Fit& named, const inference::Fit& without) {
+  absl::Status NoteWander(int index, const engine::Fit& named, const engine::Fit& without) {
     const model::Effect& effect = *named.model.base().effects[index].effect;
     if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kBeyondWanderNats)
       return absl::OkStatus();
@@ -137,12 +137,12 @@ class Competition {
     const double own = std::max(with->white_log_likelihood, with->log_likelihood - with->complexity_nats) -
                        0.5 * (workspace_.searched->fingers - 1) * with->complexity_nats;
     const double ahead_nats = alone->log_likelihood - alone->complexity_nats - own;
-    NoteRival(inference::NameOf(effect), ahead_nats,
+    NoteRival(engine::NameOf(effect), ahead_nats,
               "Noise with memory would say nearly the same: a wander of the fingers.");
     return absl::OkStatus();
   }
 
-  absl::StatusOr<std::optional<NoiseMemory>> MemoryOf(const inference::Fit& fit) const {
+  absl::StatusOr<std::optional<NoiseMemory>> MemoryOf(const engine::Fit& fit) const {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.searched_predictor->Run(fit.model.base(), false, false));
     const touches::Observations& o = *workspace_.searched;
@@ -156,18 +156,18 @@ class Competition {
   }
 
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
-  absl::StatusOr<bool> Overtake(const std::vector<int>& steps, inference::Fit* named) {
-    inference::Parameterization rest = named->model;
+  absl::StatusOr<bool> Overtake(const std::vector<int>& steps, engine::Fit* named) {
+    engine::Parameterization rest = named->model;
     std::string covariate = workspace_.input.set->has_session_time ? "session_time_s" : "touch";
     std::vector<std::string> names;
     for (auto index = steps.rbegin(); index != steps.rend(); ++index) {
       const model::Effect& effect = *named->model.base().effects[*index].effect;
       if (steps.size() == 1 && effect.needs.previous_press) covariate = "previous_press_mm";
-      names.push_back(inference::NameOf(effect));
+      names.push_back(engine::NameOf(effect));
       rest = rest.Without(*index);
     }
-    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
-                                inference::FitModel(workspace_.experiment, std::move(rest)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
+                                engine::FitModel(workspace_.experiment, std::move(rest)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves, CurvesOver(without, covariate));
     if (curves.empty()) return false;
     // An effect of one finger may say as much as a course of one finger does, in as few values.
@@ -193,8 +193,8 @@ class Competition {
       for (int index = static_cast<int>(with->fit.model.base().effects.size()) - 1;
            index >= result_.initial_effects; --index) {
         WithCurve trial;
-        TOUCHSTONE_ASSIGN_OR_RETURN(
-            trial.fit, inference::FitModel(workspace_.experiment, with->fit.model.Without(index)));
+        TOUCHSTONE_ASSIGN_OR_RETURN(trial.fit,
+                                    engine::FitModel(workspace_.experiment, with->fit.model.Without(index)));
         TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> curves,
                                     CurvesOver(trial.fit, with->curve.covariate));
         if (curves.empty()) continue;
@@ -227,9 +227,8 @@ class Competition {
   absl::Status DropWhatWandered(NoiseMemory* memory) {
     for (int index = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
          index >= result_.initial_effects; --index) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          inference::Fit without,
-          inference::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
+                                  engine::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> other, MemoryOf(without));
       if (!other || other->log_likelihood < memory->log_likelihood - kWorthUnderMemoryNats) continue;
       result_.fit = std::move(without);
@@ -239,7 +238,7 @@ class Competition {
   }
 
   // No curve says how, but repeats share a course in time.
-  absl::Status LookForMemory(const inference::Fit& named) {
+  absl::Status LookForMemory(const engine::Fit& named) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.searched_predictor->Run(named.model.base(), false, false));
     const touches::Observations& o = *workspace_.searched;
@@ -251,7 +250,7 @@ class Competition {
 
   // In fewer words, and without named effects that the curve does without.
   bool FormulaSaysTheSame(const WithCurve& with) const {
-    const auto named = [&](const inference::Fit& fit) {
+    const auto named = [&](const engine::Fit& fit) {
       return static_cast<double>(fit.model.base().effects.size()) - result_.initial_effects;
     };
     const double dropped = named(result_.without_formula) - named(with.fit);
@@ -275,13 +274,13 @@ class Competition {
       return absl::OkStatus();
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto effect, MakeCurveEffect(with.curve));
-    inference::Parameterization start = with.fit.model;
+    engine::Parameterization start = with.fit.model;
     start.Add(effect, false);
-    TOUCHSTONE_ASSIGN_OR_RETURN(result_.fit, inference::FitModel(workspace_.experiment, std::move(start)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.fit, engine::FitModel(workspace_.experiment, std::move(start)));
     result_.formula = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
     TOUCHSTONE_ASSIGN_OR_RETURN(
         result_.without_formula,
-        inference::FitModel(workspace_.experiment, result_.fit.model.Without(result_.formula)));
+        engine::FitModel(workspace_.experiment, result_.fit.model.Without(result_.formula)));
     result_.term = FormulaTerm();
     result_.term.covariate = with.curve.covariate;
     return absl::OkStatus();

@@ -36,7 +36,7 @@ TEST(CurveCompetition, AStepOfOneFingerIsNoDriftAndNoLength) {
         ResultFor("lookup", {"name=step", "adds=travel_mm", "covariate=session_time_s", "knots=1199,1200",
                              absl::StrCat("l=", mm), "m=0,0", "r=0,0"});
     EXPECT_TRUE(result.curve || (!result.steps.empty() && result.steps[0].probability <= 0.9)) << mm;
-    for (const SelectedStep& step : result.steps)
+    for (const engine::SelectedStep& step : result.steps)
       EXPECT_NE(step.words.find("A course in time"), std::string::npos) << mm;
   }
 }

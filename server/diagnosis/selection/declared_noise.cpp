@@ -6,8 +6,8 @@ namespace touchstone::diagnosis::selection {
 
 using model::EffectRole;
 
-inference::DeclaredNoise DeclaredNoiseOf(const model::Model& model) {
-  inference::DeclaredNoise declared;
+touches::DeclaredNoise DeclaredNoiseOf(const model::Model& model) {
+  touches::DeclaredNoise declared;
   for (const model::EffectInstance& instance : model.effects) {
     if (!instance.object_values.empty() || instance.values.empty()) continue;
     const double value = instance.values[0];
@@ -46,7 +46,7 @@ inference::DeclaredNoise DeclaredNoiseOf(const model::Model& model) {
 }
 
 double DeclaredSigma(const model::Model& model) {
-  const inference::DeclaredNoise declared = DeclaredNoiseOf(model);
+  const touches::DeclaredNoise declared = DeclaredNoiseOf(model);
   const bool plain = !declared.slope && !declared.degrees_of_freedom && !declared.poll_interval_s &&
                      !declared.length_sigma_m && declared.channel_sigma_s.empty();
   for (const model::EffectInstance& instance : model.effects)

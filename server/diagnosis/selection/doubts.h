@@ -18,13 +18,9 @@ struct Doubts {
 };
 
 // Of the steps that the ladder has so far; those at a bound say so in their words.
-Doubts DoubtsOf(const inference::Fit& fit, const SelectionResult& selection, Ladder* ladder);
+Doubts DoubtsOf(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder);
 
 // Says of steps that they would need more than rigs show, and is less sure of them.
-void DoubtUnusualValues(const inference::Fit& fit, const SelectionResult& selection, Ladder* ladder);
-
-// Where a rest remains unexplained the steps may be a part of something else: lowers their probabilities and says so.
-// `explained`: share of the mean square error beyond the noise that the steps take away.
-void Doubt(double explained, const Doubts& doubts, Ladder* ladder);
+void DoubtUnusualValues(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder);
 
 }  // namespace touchstone::diagnosis::selection

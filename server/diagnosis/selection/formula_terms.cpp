@@ -160,8 +160,8 @@ std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const touches::T
 
 }  // namespace
 
-std::vector<FormulaTerm> ScoreTerms(const inference::Experiment& experiment,
-                                    const touches::TouchObservationModel& touches, const inference::Fit& fit,
+std::vector<FormulaTerm> ScoreTerms(const engine::Experiment& experiment,
+                                    const touches::TouchObservationModel& touches, const engine::Fit& fit,
                                     const touches::Prediction& details) {
   const TermScorer scorer(experiment, fit);
   std::vector<FormulaTerm> terms = ScoreProducts(scorer, touches, details);

@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone::diagnosis::selection {
@@ -24,8 +24,8 @@ struct FormulaTerm {
 };
 
 // Every term's gain over `fit`, best first. `details` are of the fit's model, with curvature.
-std::vector<FormulaTerm> ScoreTerms(const inference::Experiment& experiment,
-                                    const touches::TouchObservationModel& touches, const inference::Fit& fit,
+std::vector<FormulaTerm> ScoreTerms(const engine::Experiment& experiment,
+                                    const touches::TouchObservationModel& touches, const engine::Fit& fit,
                                     const touches::Prediction& details);
 
 // The term as an effect of this name.

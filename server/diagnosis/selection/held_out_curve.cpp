@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kCurveFolds = 5, kStretches = 60;
 
-int FoldOf(const inference::Experiment& experiment, const touches::TouchObservationModel& touches, int row,
+int FoldOf(const engine::Experiment& experiment, const touches::TouchObservationModel& touches, int row,
            bool of_time) {
   if (!of_time) return experiment.observations->BlockOfRow(row) % kCurveFolds;
   const int k = touches.contrasts().touches()[touches.contrasts().touch_of_row()[row]];
@@ -21,9 +21,9 @@ int FoldOf(const inference::Experiment& experiment, const touches::TouchObservat
 
 }  // namespace
 
-double HeldOutBeside(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-                     const inference::Fit& fit, const Eigen::MatrixXd& basis,
-                     const Eigen::MatrixXd& precision, bool of_time) {
+double HeldOutBeside(const engine::Experiment& experiment, const touches::TouchObservationModel& touches,
+                     const engine::Fit& fit, const Eigen::MatrixXd& basis, const Eigen::MatrixXd& precision,
+                     bool of_time) {
   const int p = fit.model.size(), m = static_cast<int>(basis.cols()), n = touches.rows();
   Eigen::MatrixXd x(n, p + m);
   x.leftCols(p) = fit.columns.values.middleCols(1, p);

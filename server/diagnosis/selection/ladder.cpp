@@ -7,13 +7,15 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/candidate_ranking.h"
+#include "server/diagnosis/engine/findings.h"
+#include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/dropouts.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
-#include "server/diagnosis/selection/where_in_words.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -21,50 +23,44 @@ namespace {
 constexpr double kSurfaceNats = 5;        // evidence that asks for a surface error by itself
 constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
 constexpr double kMisfitP = 1e-2;
-constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
-constexpr double kUnexplainedShare = 0.01;  // of the floor that such a rest must add
 constexpr double kRoundsPossibleP =
-    0.05;                          // of agreement within rounds, for a doubt of what scatter looks like
-constexpr double kZeroErrors = 2;  // standard errors of a value that may be zero
-constexpr double kZero = 1e-6;     // ... or this share of the typical size
+    0.05;  // of agreement within rounds, for a doubt of what scatter looks like
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
-absl::StatusOr<inference::Fit> FitAll(const Workspace& workspace, const inference::Fit& fit) {
+absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit) {
   if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
   const touches::Observations& o = *workspace.observations;
   const touches::Contrasts contrasts = WeighedContrasts(workspace, o, workspace.nominal.time_s);
-  const inference::Likelihood likelihood(
+  const engine::Likelihood likelihood(
       touches::FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0, nullptr);
   const touches::TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
-  inference::Experiment all = workspace.experiment;
+  engine::Experiment all = workspace.experiment;
   all.observations = &rows;
   all.likelihood = &likelihood;
   all.pool = nullptr;  // the predictor has the threads
-  TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit whole, inference::FitModel(all, fit.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit whole, engine::FitModel(all, fit.model));
   whole.columns = fit.columns;  // held-out errors come from the search's touches
   return whole;
 }
 
-// The model with only those of its further effects that are in `kept`.
-inference::Parameterization Only(const inference::Parameterization& model, int initial_effects,
-                                 const std::vector<int>& kept) {
-  inference::Parameterization part = model;
-  for (int index = static_cast<int>(model.base().effects.size()) - 1; index >= initial_effects; --index)
-    if (std::find(kept.begin(), kept.end(), index) == kept.end()) part = part.Without(index);
-  return part;
+// The error of every touch, noisy ones in full, as the steps and the final error count them; the held-out error keeps its
+// ratio.
+void SetErrors(const Workspace& workspace, const engine::Fit& fit, engine::RankedCandidate* candidate) {
+  const touches::Contrasts& contrasts = *workspace.contrasts;
+  const Eigen::VectorXd weighted = fit.columns.values.col(0);
+  double squares = 0;
+  for (int row = 0; row < contrasts.rows(); ++row) {
+    const double value = weighted[row] / contrasts.root_weights()[contrasts.touch_of_row()[row]];
+    squares += value * value;
+  }
+  const double rows = std::max<double>(1, static_cast<double>(weighted.size()));
+  const double weighted_rmse = std::sqrt(weighted.squaredNorm() / rows);
+  candidate->rmse = std::sqrt(squares / rows);
+  candidate->heldout_rmse = engine::HeldOutRmse(workspace.experiment, fit);
+  if (weighted_rmse > 0) candidate->heldout_rmse *= candidate->rmse / weighted_rmse;
 }
-
-}  // namespace
-
-void AddTexts(const model::Effect& effect, LadderStep* step) {
-  step->meaning = effect.meaning;
-  step->check_on_rig = effect.check_on_rig;
-  step->remedy = effect.remedy;
-}
-
-namespace {
 
 class LadderBuilder {
  public:
@@ -73,7 +69,6 @@ class LadderBuilder {
 
   absl::StatusOr<Ladder> Build() {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
-    DescribeRefits();
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     DoubtUnusualValues(fit_, selection_, &ladder_);
     doubts_ = DoubtsOf(fit_, selection_, &ladder_);
@@ -95,23 +90,30 @@ class LadderBuilder {
             "Repeats agree within rounds: an object put down anew each round would look alike.";
       }
     if (!selection_.memory && !doubts_.remounted) RemoveAbsentMemory(*workspace_.observations, &ladder_);
-    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.candidates, RankCandidates(workspace_, selection_));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        ladder_.candidates,
+        engine::RankCandidates(*selection_.search, selection_.initial_model, selection_.initial_effects,
+                               [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
+                                 SetErrors(workspace_, fit, candidate);
+                                 return absl::OkStatus();
+                               }));
     const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
                       selection_.partial || unplaced_ || doubts_.any();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           ladder_.unexplained,
-          DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma_s));
+          DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma));
       if (TimeStructureRemains() || Walks())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
-      Doubt(ExplainedShare(), doubts_, &ladder_);
+      engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), doubts_.any()), &ladder_.steps,
+                              &ladder_.candidates);
     }
-    ladder_.verdict = has_formula() || rest    ? Verdict::kUnexplained
-                      : !ladder_.steps.empty() ? Verdict::kMissingEffects
-                      : ladder_.values_wrong   ? Verdict::kWrongValues
-                                               : Verdict::kAdequate;
+    ladder_.verdict = has_formula() || rest    ? engine::Verdict::kUnexplained
+                      : !ladder_.steps.empty() ? engine::Verdict::kMissingEffects
+                      : ladder_.values_wrong   ? engine::Verdict::kWrongValues
+                                               : engine::Verdict::kAdequate;
     if (ladder_.changed && !ladder_.improved.name.empty()) ladder_.improved.name += "_better";
     return std::move(ladder_);
   }
@@ -124,11 +126,11 @@ class LadderBuilder {
     const touches::Observations& o = *workspace_.observations;
     TOUCHSTONE_ASSIGN_OR_RETURN(fit_, FitAll(workspace_, selection_.fit));
     model::Model whole = fit_.model.base();
-    RoundValues(fit_, &whole);
+    engine::RoundValues(fit_, &whole);
     ladder_.improved = whole;
     if (has_formula()) ladder_.improved.effects.erase(ladder_.improved.effects.begin() + selection_.formula);
     ladder_.changed = !selection_.steps.empty();
-    TOUCHSTONE_RETURN_IF_ERROR(RemoveSuperfluous());
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven());
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
     ladder_.residuals = touches::Residuals(o, ladder_.prediction);
     std::vector<double> best = ladder_.residuals;
@@ -139,118 +141,44 @@ class LadderBuilder {
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
     AddTimeStructure(o, best, &ladder_.noise_floor);
-    ladder_.noise_floor.declared_s = DeclaredSigma(*workspace_.input.model);
+    ladder_.noise_floor.declared = DeclaredSigma(*workspace_.input.model);
     ladder_.dropouts = DropoutsInWords(o, ladder_.prediction);
     return absl::OkStatus();
   }
 
-  // Effects of the given model whose values, set free, are zero as far as the data can tell.
-  absl::Status RemoveSuperfluous() {
-    for (int index = static_cast<int>(workspace_.input.model->effects.size()) - 1; index >= 0; --index) {
-      if (!fit_.model.IsFree(index)) continue;
-      const model::Effect& effect = *fit_.model.base().effects[index].effect;
-      bool zero = true;
-      for (const inference::ParameterEstimate& e : fit_.model.Describe(index, fit_.point, fit_.covariance))
-        for (const model::ParameterInfo& parameter : effect.parameters)
-          if (parameter.name == e.name)
-            zero &=
-                !parameter.reciprocal && std::abs(e.value - parameter.neutral) <=
-                                             std::max(kZeroErrors * e.std_error, kZero * parameter.typical);
-      if (!zero) continue;
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          const inference::Fit without,
-          inference::FitModel(workspace_.experiment, selection_.fit.model.Without(index)));
-      if (without.log_evidence < selection_.fit.log_evidence) continue;
-      superfluous_.push_back(index);
-      ladder_.superfluous.push_back(inference::NameOf(effect));
+  // Values of the given model's effects that were set free: new ones, or zero as far as the data can tell.
+  absl::Status DescribeGiven() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        engine::GivenEffects given,
+        engine::DescribeGivenEffects(workspace_.experiment, selection_.fit, fit_, fit_.covariance,
+                                     *workspace_.input.model, workspace_.observations->objects));
+    for (const int index : given.superfluous)
       ladder_.improved.effects.erase(ladder_.improved.effects.begin() + index);
-      ladder_.values_wrong = true;
-      ladder_.changed = true;
-    }
+    ladder_.values_wrong = given.changed();
+    ladder_.changed |= given.changed();
+    ladder_.superfluous = std::move(given.superfluous_names);
+    ladder_.refitted = std::move(given.refitted);
     return absl::OkStatus();
   }
 
-  void DescribeRefits() {
-    const model::Model& before = *workspace_.input.model;
-    const inference::Parameterization initial(before, workspace_.observations->objects);
-    for (int index = 0; index < static_cast<int>(before.effects.size()); ++index) {
-      if (!fit_.model.IsFree(index)) continue;
-      if (std::find(superfluous_.begin(), superfluous_.end(), index) != superfluous_.end()) continue;
-      const std::vector<inference::ParameterEstimate> old =
-          initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
-      RefittedEffect refit;
-      refit.effect = inference::NameOf(*before.effects[index].effect);
-      refit.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
-      for (size_t j = 0; j < refit.parameters.size() && j < old.size(); ++j)
-        refit.parameters[j].before = old[j].value;
-      ladder_.refitted.push_back(std::move(refit));
-      ladder_.values_wrong = true;
-      ladder_.changed = true;
-    }
-  }
-
-  // Steps in the order in which they explain most.
   absl::Status DescribeSteps() {
-    std::vector<int> kept, open;
-    for (const SelectedStep& step : selection_.steps) open.push_back(step.effect);
-    while (!open.empty()) {
-      absl::StatusOr<inference::Fit> next = absl::NotFoundError("");
-      size_t chosen = 0;
-      for (size_t j = 0; j < open.size(); ++j) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit trial, FitWith(kept, open[j], open.size() == 1));
-        if (next.ok() && trial.log_evidence <= next->log_evidence) continue;
-        next = std::move(trial);
-        chosen = j;
-      }
-      kept.push_back(open[chosen]);
-      open.erase(open.begin() + static_cast<long>(chosen));
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(kept.back(), *next));
-    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::vector<engine::OrderedStep> ordered,
+        engine::OrderSteps(workspace_.experiment, {selection_.fit, selection_.initial_effects},
+                           selection_.formula, selection_.steps));
+    for (const engine::OrderedStep& step : ordered) TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(step));
     return absl::OkStatus();
   }
 
-  // The fit with the steps kept so far and one more; the last one is the whole fit.
-  absl::StatusOr<inference::Fit> FitWith(std::vector<int> kept, int further, bool last) const {
-    if (last && !has_formula()) return selection_.fit;
-    kept.push_back(further);
-    return inference::FitModel(workspace_.experiment,
-                               Only(selection_.fit.model, selection_.initial_effects, kept));
-  }
-
-  absl::Status DescribeStep(int index, const inference::Fit& with_it) {
-    const SelectedStep& from = *std::find_if(selection_.steps.begin(), selection_.steps.end(),
-                                             [&](const SelectedStep& s) { return s.effect == index; });
-    const model::EffectInstance& instance = fit_.model.base().effects[index];
-    LadderStep step;
-    step.effect = inference::NameOf(*instance.effect);
-    step.scope = instance.per_object ? EffectScope::kObject : EffectScope::kRig;
-    AddTexts(*instance.effect, &step);
-    step.probability = from.probability;
-    step.words = from.words;
-    step.gain_nats = from.gain_nats;
-    step.parameters = fit_.model.Describe(index, fit_.point, fit_.covariance);
-    if (const std::string where = WhereInWords(fit_, from); !where.empty())
-      step.words = absl::StrCat(where, step.words.empty() ? "" : " ", step.words);
-    std::vector<std::string> equivalent = {step.effect};
-    for (const CompetingEffect& other : from.competing)
-      if (other.equivalent && std::find(equivalent.begin(), equivalent.end(), other.name) == equivalent.end())
-        equivalent.push_back(other.name);
-    step.equivalent.assign(equivalent.begin() + 1, equivalent.end());
-    for (const CompetingEffect& other : from.competing)
-      if (other.stopped && other.per_object == instance.per_object &&
-          other.object == fit_.model.OnlyObject(index))
-        step.words += absl::StrCat(step.words.empty() ? "" : " ", other.name,
-                                   " would do as well with a value beyond its bound.");
-    if (!step.equivalent.empty()) {
-      step.discriminating_measurement = DiscriminatingMeasurement(equivalent);
-      ladder_.confounded.push_back({equivalent, step.discriminating_measurement});
-    }
+  absl::Status DescribeStep(const engine::OrderedStep& ordered) {
+    engine::LadderStep step = engine::DescribeStep(fit_, fit_.covariance, *ordered.step);
+    engine::AddConfounded(step, &ladder_.confounded);
+    step.model = ordered.fit.model.base();
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.predictor->Run(with_it.model.base(), false, false));
+                                workspace_.predictor->Run(step.model, false, false));
     TOUCHSTONE_ASSIGN_OR_RETURN(
         step.quality,
-        QualityOf(workspace_, with_it, touches::Residuals(*workspace_.observations, prediction)));
-    step.model = with_it.model.base();
+        QualityOf(workspace_, ordered.fit, touches::Residuals(*workspace_.observations, prediction)));
     TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
@@ -294,7 +222,7 @@ class LadderBuilder {
   // Whether repeats agree within rounds: a curve of time or a wander would look alike.
   void QuestionRounds() {
     if (selection_.curve || selection_.memory || selection_.partial) return;
-    const double sigma_s = ladder_.noise_floor.sigma_s;
+    const double sigma_s = ladder_.noise_floor.sigma;
     rounds_ = FindRoundStructure(*workspace_.observations, ladder_.prediction, ladder_.residuals);
     if (!SharesRounds(rounds_, sigma_s)) return;
     doubts_.remounted = true;
@@ -303,8 +231,7 @@ class LadderBuilder {
 
   bool StructureRemains() const {
     // Under a wander repeats are alike by chance, and the test of their scatter does not hold.
-    return !has_formula() && !selection_.memory && left_.lack_of_fit_p < kUnexplainedP &&
-           left_.rmse_s > (1 + kUnexplainedShare) * ladder_.noise_floor.sigma_s;
+    return !has_formula() && !selection_.memory && engine::StructureRemains(left_, ladder_.noise_floor.sigma);
   }
 
   // A wander of which the session does not show that it comes back is no noise of a known memory.
@@ -331,12 +258,9 @@ class LadderBuilder {
 
   // Of the mean square error that is no noise, what the steps take away.
   double ExplainedShare() const {
-    const double floor_s2 = ladder_.noise_floor.sigma_s * ladder_.noise_floor.sigma_s;
     const touches::Observations& o = *workspace_.observations;
-    const double before_s2 =
-        std::pow(touches::Rmse(o, touches::Residuals(o, workspace_.nominal)), 2) - floor_s2;
-    const double after_s2 = left_.rmse_s * left_.rmse_s - floor_s2;
-    return before_s2 > 0 ? std::clamp(1 - after_s2 / before_s2, 0.0, 1.0) : 0;
+    return engine::ExplainedShare(touches::Rmse(o, touches::Residuals(o, workspace_.nominal)), left_.rmse,
+                                  ladder_.noise_floor.sigma);
   }
 
   // Repeats that share a course in time are not noise.
@@ -344,9 +268,8 @@ class LadderBuilder {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
-  inference::Fit fit_;            // on all touches
-  Quality left_;                  // on the touches that the fits used: what the verdict is about
-  std::vector<int> superfluous_;  // effects of the given model
+  engine::Fit fit_;       // on all touches
+  engine::Quality left_;  // on the touches that the fits used: what the verdict is about
   Doubts doubts_;
   RoundStructure rounds_;
   SurfaceSupport support_;

@@ -5,23 +5,23 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/selection/quality.h"
-#include "server/diagnosis/selection/result.h"
 #include "server/diagnosis/selection/selection.h"
 
 namespace touchstone::diagnosis::selection {
 
 struct Ladder {
-  Verdict verdict = Verdict::kNone;
-  NoiseFloor noise_floor;
-  std::vector<RefittedEffect> refitted;
-  std::vector<LadderStep> steps;         // in the order in which they explain most
-  std::vector<std::string> superfluous;  // effects of the initial model that the data do without
-  std::string dropouts;  // where contacts are missed, for people; empty: nowhere in particular
-  Quality final;         // after all steps and refits
-  std::vector<ConfoundedEffects> confounded;
-  std::vector<RankedCandidate> candidates;  // best first
-  std::optional<UnexplainedRest> unexplained;
+  engine::Verdict verdict = engine::Verdict::kNone;
+  engine::NoiseFloor noise_floor;
+  std::vector<engine::RefittedEffect> refitted;
+  std::vector<engine::LadderStep> steps;  // in the order in which they explain most
+  std::vector<std::string> superfluous;   // effects of the initial model that the data do without
+  std::string dropouts;   // where contacts are missed, for people; empty: nowhere in particular
+  engine::Quality final;  // after all steps and refits
+  std::vector<engine::ConfoundedEffects> confounded;
+  std::vector<engine::RankedCandidate> candidates;  // best first
+  std::optional<engine::UnexplainedRest> unexplained;
 
   model::Model improved;           // the initial model with steps and refits, without a formula
   bool changed = false;            // improved differs from the initial model
@@ -34,13 +34,10 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionRe
 
 // Its parts.
 
-// What the catalogue says of an effect, for people.
-void AddTexts(const model::Effect& effect, LadderStep* step);
-
 // The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
 // noise floor and final errors, which noise does not change. Where the noise `wanders`, or repeats share a course in
 // time, only its level, ticks and dropouts are judged: a wander by itself makes fingers differ and tails heavy.
-void AddNoiseSteps(inference::NoiseFindings noise, bool wanders, Ladder* ladder);
+void AddNoiseSteps(touches::NoiseFindings noise, bool wanders, Ladder* ladder);
 
 // A wander of the fingers, as a step or a refit.
 void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
@@ -48,23 +45,10 @@ void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
 // Takes a wander out of the improved model that the given one has and the residuals rule out.
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);
 
-// Every effect of the catalogue as the only step.
-absl::StatusOr<std::vector<RankedCandidate>> RankCandidates(const Workspace& workspace,
-                                                            const SelectionResult& selection);
-
 // What depends on which covariate where no named effect explains it, and a formula, if one was found. `final`:
 // errors after all steps, `floor_s`: of the noise.
-absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
-                                                    const SelectionResult& selection, const Quality& final,
-                                                    double floor_s);
-
-// The effect as it stands in a model file: "- lookup: ...". Of `model` only the rig counts.
-std::string EffectYaml(model::Model model, model::EffectInstance instance);
-
-// A value that a person can read: three more digits than the standard error leaves uncertain.
-double RoundedTo(double value, double std_error);
-
-// Sets the fitted values of a model, rounded so.
-void RoundValues(const inference::Fit& fit, model::Model* model);
+absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
+                                                            const SelectionResult& selection,
+                                                            const engine::Quality& final, double floor_s);
 
 }  // namespace touchstone::diagnosis::selection

@@ -8,7 +8,7 @@
 
 #include "server/base/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/inference/laplace_evidence.h"
+#include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/selection/held_out_curve.h"
 #include "server/diagnosis/selection/time_course.h"
 
@@ -58,8 +58,8 @@ double LogDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
 
 class CurveScorer {
  public:
-  CurveScorer(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-              const inference::Fit& fit, const touches::Prediction& details)
+  CurveScorer(const engine::Experiment& experiment, const touches::TouchObservationModel& touches,
+              const engine::Fit& fit, const touches::Prediction& details)
       : experiment_(experiment),
         likelihood_(*experiment.likelihood),
         touches_(touches),
@@ -131,8 +131,8 @@ class CurveScorer {
   void FitUnder(const std::vector<int>& hypotheses, NamelessCurve* curve) {
     const int knots = static_cast<int>(curve->knots.size()), lists = curve->per_finger ? o_.fingers : 1;
     const double size = TypicalSize(curve->adds_time);
-    const inference::Likelihood::Columns all =
-        inference::Likelihood::Join(fit_.columns, likelihood_.Prepare(basis_));
+    const engine::Likelihood::Columns all =
+        engine::Likelihood::Join(fit_.columns, likelihood_.Prepare(basis_));
     double best = -INFINITY, sum = 0;
     std::vector<double> evidences;
     for (const int s : hypotheses) {
@@ -219,11 +219,11 @@ class CurveScorer {
     return part;
   }
 
-  const inference::Experiment& experiment_;
-  const inference::Likelihood& likelihood_;
+  const engine::Experiment& experiment_;
+  const engine::Likelihood& likelihood_;
   const touches::TouchObservationModel& touches_;
   const touches::Observations& o_;
-  const inference::Fit& fit_;
+  const engine::Fit& fit_;
   const touches::Prediction& details_;
   std::vector<int> hypotheses_, few_hypotheses_;  // of the surface
   double base_log_ = 0;
@@ -232,10 +232,9 @@ class CurveScorer {
 
 }  // namespace
 
-std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
-                                       const touches::TouchObservationModel& touches,
-                                       const inference::Fit& fit, const touches::Prediction& details,
-                                       const std::string& only) {
+std::vector<NamelessCurve> ScoreCurves(const engine::Experiment& experiment,
+                                       const touches::TouchObservationModel& touches, const engine::Fit& fit,
+                                       const touches::Prediction& details, const std::string& only) {
   const touches::Observations& o = touches.observations();
   CurveScorer scorer(experiment, touches, fit, details);
   const std::vector<double>& speeds = o.set->speed_m_s;
@@ -273,7 +272,7 @@ std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
     }
     best.one_finger_constant_nats = courses.one_finger_constant_nats;
     best.one_finger_line_nats = courses.one_finger_line_nats;
-    best.any_gain_nats = inference::LogSum(competing) - std::log(std::max<double>(1, competing.size()));
+    best.any_gain_nats = engine::LogSum(competing) - std::log(std::max<double>(1, competing.size()));
     if (!best.covariate.empty()) curves.push_back(std::move(best));
   }
   // An evidence ratio of x is reached by chance with a probability below 1 / x (Markov); every curve is paid for.

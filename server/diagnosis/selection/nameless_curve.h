@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone::diagnosis::selection {
@@ -48,10 +48,9 @@ struct NamelessCurve {
 
 // Curves over `fit`, largest gain first: one per covariate, the better of shared and per finger. Held-out errors are
 // those of the best few only. `only`: of this covariate alone; empty: of all.
-std::vector<NamelessCurve> ScoreCurves(const inference::Experiment& experiment,
-                                       const touches::TouchObservationModel& touches,
-                                       const inference::Fit& fit, const touches::Prediction& details,
-                                       const std::string& only);
+std::vector<NamelessCurve> ScoreCurves(const engine::Experiment& experiment,
+                                       const touches::TouchObservationModel& touches, const engine::Fit& fit,
+                                       const touches::Prediction& details, const std::string& only);
 
 // Whether chance hardly brings the curve about, and touches that it was not fitted to have less error with it.
 bool IsSignificant(const NamelessCurve& curve);

@@ -5,15 +5,15 @@
 #include <optional>
 #include <vector>
 
-#include "server/diagnosis/inference/noise_kinds.h"
+#include "server/diagnosis/touches/noise_kinds.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {
 
 struct NoiseMemory {
-  inference::NoiseEstimate sigma_s;                     // of the wander
-  inference::NoiseEstimate time_s;                      // its correlation time
-  inference::NoiseEstimate white_s;                     // of the noise without memory beside it
+  touches::NoiseEstimate sigma_s;                       // of the wander
+  touches::NoiseEstimate time_s;                        // its correlation time
+  touches::NoiseEstimate white_s;                       // of the noise without memory beside it
   double log_likelihood = 0, white_log_likelihood = 0;  // with the wander; of noise without memory alone
   double complexity_nats = 0;                           // of the wander's two values (BIC)
   // By how much a wander that forgets fits better than a walk, which never does. Near 0 the session is too short to tell

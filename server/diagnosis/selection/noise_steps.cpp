@@ -25,12 +25,12 @@ class NoiseStepWriter {
   explicit NoiseStepWriter(Ladder* ladder) : ladder_(*ladder) {}
 
   // The effect of this role, which has one parameter.
-  void Write(model::EffectRole role, const inference::NoiseEstimate& found) {
+  void Write(model::EffectRole role, const touches::NoiseEstimate& found) {
     model::EffectInstance* present = nullptr;
     for (model::EffectInstance& instance : ladder_.improved.effects)
       if (instance.effect->role == role) present = &instance;
     const auto effect = effects::FindByRole(role);
-    const inference::ParameterEstimate estimate = Estimate(effect->parameters[0], found);
+    const engine::ParameterEstimate estimate = Estimate(effect->parameters[0], found);
     if (present != nullptr)
       Refit(estimate, present);
     else
@@ -48,7 +48,7 @@ class NoiseStepWriter {
     }
   }
 
-  void WriteOrRemove(model::EffectRole role, const inference::NoiseEstimate& found) {
+  void WriteOrRemove(model::EffectRole role, const touches::NoiseEstimate& found) {
     if (found.absent)
       Remove(role);
     else if (found.gain_nats > 0)
@@ -56,12 +56,12 @@ class NoiseStepWriter {
   }
 
   // What the fingers' noise has beyond the quietest finger's.
-  void WriteByFinger(const std::vector<inference::NoiseEstimate>& found) {
+  void WriteByFinger(const std::vector<touches::NoiseEstimate>& found) {
     const auto effect = effects::FindByRole(model::EffectRole::kNoiseByFinger);
     const model::ParameterInfo& parameter = effect->parameters[0];
-    std::vector<inference::ParameterEstimate> estimates;
+    std::vector<engine::ParameterEstimate> estimates;
     std::vector<double> values;
-    for (const inference::NoiseEstimate& finger : found) {
+    for (const touches::NoiseEstimate& finger : found) {
       estimates.push_back(Estimate(parameter, finger));
       estimates.back().entry = model::FingerName(static_cast<int>(values.size()), ladder_.improved.fingers);
       values.push_back(RoundedValue(parameter, estimates.back()));
@@ -79,8 +79,8 @@ class NoiseStepWriter {
   // The wander has two parameters; a model that has it keeps values that are not clearly others.
   void WriteMemory(const NoiseMemory& memory) {
     const auto effect = effects::FindByRole(model::EffectRole::kNoiseMemory);
-    const std::vector<inference::ParameterEstimate> estimates = {
-        Estimate(effect->parameters[0], memory.sigma_s), Estimate(effect->parameters[1], memory.time_s)};
+    const std::vector<engine::ParameterEstimate> estimates = {Estimate(effect->parameters[0], memory.sigma_s),
+                                                              Estimate(effect->parameters[1], memory.time_s)};
     for (model::EffectInstance& instance : ladder_.improved.effects) {
       if (instance.effect->role != model::EffectRole::kNoiseMemory) continue;
       RefitAll(estimates, &instance);
@@ -89,12 +89,12 @@ class NoiseStepWriter {
     Add(effect, estimates[0], memory.gain_nats);
     ladder_.steps.back().parameters = estimates;
     ladder_.improved.effects.back().values[1] =
-        ToSi(effect->parameters[1].unit, RoundedTo(estimates[1].value, estimates[1].std_error));
+        ToSi(effect->parameters[1].unit, engine::RoundedTo(estimates[1].value, estimates[1].std_error));
   }
 
  private:
   // All values of an effect, one estimate each: new ones if any is clearly another.
-  void RefitAll(std::vector<inference::ParameterEstimate> estimates, model::EffectInstance* present) {
+  void RefitAll(std::vector<engine::ParameterEstimate> estimates, model::EffectInstance* present) {
     const std::vector<model::ParameterInfo>& parameters = present->effect->parameters;
     bool other = false;
     for (size_t p = 0; p < estimates.size(); ++p) {
@@ -110,9 +110,9 @@ class NoiseStepWriter {
     ladder_.changed = true;
   }
 
-  static inference::ParameterEstimate Estimate(const model::ParameterInfo& parameter,
-                                               const inference::NoiseEstimate& found) {
-    inference::ParameterEstimate estimate;
+  static engine::ParameterEstimate Estimate(const model::ParameterInfo& parameter,
+                                            const touches::NoiseEstimate& found) {
+    engine::ParameterEstimate estimate;
     estimate.name = parameter.name;
     estimate.unit = std::string(UnitSymbol(parameter.unit));
     estimate.value = FromSi(parameter.unit, std::clamp(found.value, ToSi(parameter.unit, parameter.lower),
@@ -125,12 +125,12 @@ class NoiseStepWriter {
 
   // SI. Rounding must not push a value over its bound: no model file may hold it.
   static double RoundedValue(const model::ParameterInfo& parameter,
-                             const inference::ParameterEstimate& estimate) {
-    const double rounded = RoundedTo(estimate.value, estimate.std_error);
+                             const engine::ParameterEstimate& estimate) {
+    const double rounded = engine::RoundedTo(estimate.value, estimate.std_error);
     return ToSi(parameter.unit, std::clamp(rounded, parameter.lower, parameter.upper));
   }
 
-  void Refit(inference::ParameterEstimate estimate, model::EffectInstance* present) {
+  void Refit(engine::ParameterEstimate estimate, model::EffectInstance* present) {
     const Unit unit = present->effect->parameters[0].unit;
     const double before = FromSi(unit, present->values[0]), change = std::abs(estimate.value - before);
     if (change < kSignificant * estimate.std_error || change < kRelevant * estimate.value) return;
@@ -141,15 +141,15 @@ class NoiseStepWriter {
     ladder_.changed = true;
   }
 
-  void Add(const std::shared_ptr<const model::Effect>& effect, const inference::ParameterEstimate& estimate,
+  void Add(const std::shared_ptr<const model::Effect>& effect, const engine::ParameterEstimate& estimate,
            double gain_nats) {
-    LadderStep step;
+    engine::LadderStep step;
     step.effect = effect->name;
     step.meaning = effect->meaning;
     step.check_on_rig = effect->check_on_rig;
     step.remedy = effect->remedy;
     step.gain_nats = gain_nats;
-    step.probability = ProbabilityOf(gain_nats);
+    step.probability = engine::ProbabilityOf(gain_nats);
     step.parameters = {estimate};
     step.quality = ladder_.final;  // noise changes no expectation: the errors stay
     if (effect->role == model::EffectRole::kDropout) step.words = std::exchange(ladder_.dropouts, "");
@@ -184,15 +184,15 @@ namespace {
 
 // The noise of one reading. Where repeats say how much they scatter, what a misfit adds to the residuals is no noise,
 // and neither is a course in time that repeats share.
-inference::NoiseEstimate SigmaOf(const inference::NoiseFindings& noise, const NoiseFloor& floor) {
-  inference::NoiseEstimate sigma = noise.sigma_s;
+touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine::NoiseFloor& floor) {
+  touches::NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = kCertainNats;
   const bool plain = noise.slope.gain_nats == 0 && noise.degrees_of_freedom.gain_nats == 0 &&
                      noise.poll_interval_s.gain_nats == 0 && noise.length_sigma_m.gain_nats == 0 &&
                      noise.channel_sigma_s.empty();
   if (!plain || !floor.from_repeats) return sigma;
-  const double floor_s = SharesTime(floor) ? floor.sigma_without_time_s : floor.sigma_s;
-  if (sigma.value <= floor_s + (floor.upper_s - floor.sigma_s)) return sigma;
+  const double floor_s = SharesTime(floor) ? floor.sigma_without_time : floor.sigma;
+  if (sigma.value <= floor_s + (floor.upper - floor.sigma)) return sigma;
   sigma.value = floor_s;
   sigma.std_error = floor_s / std::sqrt(2 * floor.degrees_of_freedom);
   return sigma;
@@ -200,7 +200,7 @@ inference::NoiseEstimate SigmaOf(const inference::NoiseFindings& noise, const No
 
 }  // namespace
 
-void AddNoiseSteps(inference::NoiseFindings noise, bool wanders, Ladder* ladder) {
+void AddNoiseSteps(touches::NoiseFindings noise, bool wanders, Ladder* ladder) {
   NoiseStepWriter writer(ladder);
   if (wanders || SharesTime(ladder->noise_floor)) {
     noise.slope = noise.degrees_of_freedom = noise.length_sigma_m = {};
@@ -211,12 +211,12 @@ void AddNoiseSteps(inference::NoiseFindings noise, bool wanders, Ladder* ladder)
   const bool has_sigma = std::any_of(
       given.effects.begin(), given.effects.end(),
       [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
-  const inference::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
+  const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
   if (sigma.absent)
     writer.Remove(model::EffectRole::kNoiseLevel);
-  else if (scatter && (has_sigma || ladder->noise_floor.sigma_s * kMicrosecondsPerSecond > kMinFloorUs))
+  else if (scatter && (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kMinFloorUs))
     writer.Write(model::EffectRole::kNoiseLevel, sigma);
   writer.WriteOrRemove(model::EffectRole::kNoiseGrowth, noise.slope);
   writer.WriteOrRemove(model::EffectRole::kNoiseTails, noise.degrees_of_freedom);

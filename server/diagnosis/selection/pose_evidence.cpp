@@ -46,7 +46,7 @@ std::vector<PoseMean> MeansOf(const Workspace& workspace, const Eigen::MatrixXd&
 
 }  // namespace
 
-PoseEvidence::PoseEvidence(const Workspace& workspace, const inference::Fit& fit,
+PoseEvidence::PoseEvidence(const Workspace& workspace, const engine::Fit& fit,
                            const touches::Prediction& details)
     : workspace_(workspace), details_(details), means_(MeansOf(workspace, fit.columns.values)) {
   Eigen::Index rows = 0;
@@ -67,10 +67,10 @@ std::vector<int> PoseEvidence::FirstRows(bool by_object) const {
   return first;
 }
 
-inference::SmoothErrorGeometry PoseEvidence::GeometryOf(const PoseFunction& function) const {
+engine::SmoothErrorGeometry PoseEvidence::GeometryOf(const PoseFunction& function) const {
   const touches::Observations& o = *workspace_.searched;
   const size_t groups = function.by_object ? o.objects.size() : 1;
-  inference::SmoothErrorGeometry geometry;
+  engine::SmoothErrorGeometry geometry;
   geometry.sites.resize(groups);
   geometry.distinct_m.resize(groups);
   geometry.size_m = function.size;
@@ -82,7 +82,7 @@ inference::SmoothErrorGeometry PoseEvidence::GeometryOf(const PoseFunction& func
     for (int i = 0; i < o.fingers; ++i) {
       if (!workspace_.contrasts->TakesPart(mean.touch, i)) continue;
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
-      inference::SmoothErrorSite site;
+      engine::SmoothErrorSite site;
       site.position_m = function.place(e, i, mean.object);
       // A finger that the fit's model expects to miss says nothing of a place.
       if (!site.position_m.allFinite() || !std::isfinite(details_.inverse_speed_s_per_m[e])) continue;
@@ -103,9 +103,9 @@ inference::SmoothErrorGeometry PoseEvidence::GeometryOf(const PoseFunction& func
   return geometry;
 }
 
-inference::Likelihood PoseEvidence::LikelihoodOf(const PoseFunction& function) const {
-  const inference::SmoothErrorGeometry geometry = GeometryOf(function);
-  return inference::Likelihood(FirstRows(function.by_object), &geometry, 0, workspace_.context.pool);
+engine::Likelihood PoseEvidence::LikelihoodOf(const PoseFunction& function) const {
+  const engine::SmoothErrorGeometry geometry = GeometryOf(function);
+  return engine::Likelihood(FirstRows(function.by_object), &geometry, 0, workspace_.context.pool);
 }
 
 double PoseEvidence::NatsOfOwnErrors(OwnError kind) const {
@@ -154,8 +154,8 @@ double PoseEvidence::NatsOfOwnErrors(OwnError kind) const {
   return best + std::log(sum);
 }
 
-double PoseEvidence::NatsOf(const inference::Likelihood& likelihood, int* best, double* sigma_s) const {
-  const inference::Likelihood::Columns columns = likelihood.Prepare(values_.col(0));
+double PoseEvidence::NatsOf(const engine::Likelihood& likelihood, int* best, double* sigma_s) const {
+  const engine::Likelihood::Columns columns = likelihood.Prepare(values_.col(0));
   const int hypotheses = static_cast<int>(likelihood.hypotheses().size());
   std::vector<double> logs;
   *best = 0;

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis::selection {
@@ -35,17 +35,17 @@ struct PoseFunction {
 class PoseEvidence {
  public:
   // `details`: of the fit's model, on the touches of the search. Both and the workspace must outlive it.
-  PoseEvidence(const Workspace& workspace, const inference::Fit& fit, const touches::Prediction& details);
+  PoseEvidence(const Workspace& workspace, const engine::Fit& fit, const touches::Prediction& details);
 
   const std::vector<PoseMean>& means() const { return means_; }  // object by object
   const Eigen::MatrixXd& values() const { return values_; }  // the poses' contrasts, in the order of means()
   std::vector<int> FirstRows(bool by_object) const;
-  inference::SmoothErrorGeometry GeometryOf(const PoseFunction& function) const;
-  inference::Likelihood LikelihoodOf(const PoseFunction& function) const;
+  engine::SmoothErrorGeometry GeometryOf(const PoseFunction& function) const;
+  engine::Likelihood LikelihoodOf(const PoseFunction& function) const;
 
   // Log evidence of any such function over none, nats; `best`: the most probable hypothesis that there is one, with the
   // standard deviation of what it leaves in a pose's contrast, s.
-  double NatsOf(const inference::Likelihood& likelihood, int* best, double* sigma_s) const;
+  double NatsOf(const engine::Likelihood& likelihood, int* best, double* sigma_s) const;
 
   // How an error that every pose and finger has for itself grows with the incidence.
   enum class OwnError { kAlongNormal, kAlongSurface };  // as 1 / cos, as tan

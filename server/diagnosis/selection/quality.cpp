@@ -5,7 +5,7 @@
 
 #include "server/base/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/inference/held_out.h"
+#include "server/diagnosis/engine/held_out.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -13,14 +13,14 @@ namespace {
 constexpr double kMinDegreesOfFreedom = 8;
 
 // Held-out error over error, on the touches of the search.
-double RatioOf(const inference::Fit& fit, double heldout_rmse_s) {
+double RatioOf(const engine::Fit& fit, double heldout_rmse_s) {
   const double rmse_s = std::sqrt(fit.columns.values.col(0).squaredNorm() /
                                   std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
   return rmse_s > 0 ? heldout_rmse_s / rmse_s : 1;
 }
 
 // Without repeats: how much better a smooth remainder explains the residuals than none.
-double SmoothRemainderP(const Workspace& workspace, const inference::Fit& fit) {
+double SmoothRemainderP(const Workspace& workspace, const engine::Fit& fit) {
   const double gain = std::max(SurfaceErrorNats(workspace, fit), 0.0);
   return 0.5 * ChiSquaredTail(2 * gain, 1) + (gain > 0 ? 0 : 0.5);
 }
@@ -40,14 +40,14 @@ double LackOfFitP(const touches::Observations& o, const std::vector<double>& res
   return FisherTail(f, dof, pure.degrees_of_freedom);
 }
 
-absl::StatusOr<Quality> QualityOf(const Workspace& workspace, const inference::Fit& fit,
-                                  const std::vector<double>& residuals) {
-  Quality quality;
+absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engine::Fit& fit,
+                                          const std::vector<double>& residuals) {
+  engine::Quality quality;
   const touches::Observations& o = *workspace.observations;
-  quality.rmse_s = touches::Rmse(o, residuals);
+  quality.rmse = touches::Rmse(o, residuals);
   TOUCHSTONE_ASSIGN_OR_RETURN(const double heldout_rmse_s,
-                              inference::HeldOutRmseRefitted(workspace.experiment, fit));
-  quality.heldout_rmse_s = quality.rmse_s * RatioOf(fit, heldout_rmse_s);
+                              engine::HeldOutRmseRefitted(workspace.experiment, fit));
+  quality.heldout_rmse = quality.rmse * RatioOf(fit, heldout_rmse_s);
   quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
                                                                 : SmoothRemainderP(workspace, fit);
   return quality;
@@ -63,32 +63,33 @@ absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::
   return touches::Rmse(o, touches::Residuals(o, prediction));
 }
 
-void SetError(double rmse_s, Quality* quality) {
-  if (quality->rmse_s > 0) quality->heldout_rmse_s *= rmse_s / quality->rmse_s;
-  quality->rmse_s = rmse_s;
+void SetError(double rmse_s, engine::Quality* quality) {
+  if (quality->rmse > 0) quality->heldout_rmse *= rmse_s / quality->rmse;
+  quality->rmse = rmse_s;
 }
 
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality) {
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model,
+                                 engine::Quality* quality) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
   SetError(rmse_s, quality);
   return absl::OkStatus();
 }
 
-Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit) {
-  Quality quality;
+engine::Quality QualityWithoutSurface(const Workspace& workspace, const engine::Fit& fit) {
+  engine::Quality quality;
   const std::vector<double> left = ResidualsWithoutSurface(workspace, fit);
   const double effective_dof =
       workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof + fit.model.size();
   const touches::SumOfSquares total = touches::TotalSquares(*workspace.searched, left);
-  quality.rmse_s = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
-  quality.heldout_rmse_s = quality.rmse_s * RatioOf(fit, inference::HeldOutRmse(workspace.experiment, fit));
+  quality.rmse = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
+  quality.heldout_rmse = quality.rmse * RatioOf(fit, engine::HeldOutRmse(workspace.experiment, fit));
   quality.lack_of_fit_p = LackOfFitP(*workspace.searched, left, effective_dof);
   return quality;
 }
 
-NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vector<double>& best,
-                        double fitted_parameters) {
-  NoiseFloor floor;
+engine::NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vector<double>& best,
+                                double fitted_parameters) {
+  engine::NoiseFloor floor;
   touches::SumOfSquares error = PureErrorOf(o, best);
   floor.from_repeats = HasRepeats(error);
   if (!floor.from_repeats) {
@@ -96,15 +97,14 @@ NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vector<double
     error.degrees_of_freedom = std::max(error.degrees_of_freedom - fitted_parameters, 1.0);
   }
   floor.degrees_of_freedom = error.degrees_of_freedom;
-  if (error.degrees_of_freedom > 0)
-    floor.sigma_s = std::sqrt(error.sum_of_squares / error.degrees_of_freedom);
+  if (error.degrees_of_freedom > 0) floor.sigma = std::sqrt(error.sum_of_squares / error.degrees_of_freedom);
   if (error.degrees_of_freedom >= 1) {
     const auto bound_s = [&](double p) {
-      return floor.sigma_s *
+      return floor.sigma *
              std::sqrt(error.degrees_of_freedom / ChiSquaredQuantile(p, error.degrees_of_freedom));
     };
-    floor.lower_s = bound_s(0.975);
-    floor.upper_s = bound_s(0.025);
+    floor.lower = bound_s(0.975);
+    floor.upper = bound_s(0.025);
   }
   return floor;
 }

@@ -1,7 +1,7 @@
 // How good a model is: error, error on touches left out, lack of fit.
 #pragma once
 
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/selection/selection.h"
 
 namespace touchstone::diagnosis::selection {
@@ -16,23 +16,24 @@ bool HasRepeats(const touches::SumOfSquares& error);
 
 // Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
 // comes from the touches of the search, with every value fitted anew (inference/held_out.h).
-absl::StatusOr<Quality> QualityOf(const Workspace& workspace, const inference::Fit& fit,
-                                  const std::vector<double>& residuals);
+absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engine::Fit& fit,
+                                          const std::vector<double>& residuals);
 
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
 // Another error, s, of the same fit; the held-out error keeps its ratio to it.
-void SetError(double rmse_s, Quality* quality);
+void SetError(double rmse_s, engine::Quality* quality);
 
 // Sets the errors of `quality` to those of `model` as a comparison finds them.
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model, Quality* quality);
+absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model,
+                                 engine::Quality* quality);
 
 // The same for what the fit's surface error leaves, on the touches of the search.
-Quality QualityWithoutSurface(const Workspace& workspace, const inference::Fit& fit);
+engine::Quality QualityWithoutSurface(const Workspace& workspace, const engine::Fit& fit);
 
 // The floor below which no model can go, from the repeats, else from `best`, residuals of the best model.
-NoiseFloor NoiseFloorOf(const touches::Observations& observations, const std::vector<double>& best,
-                        double fitted_parameters);
+engine::NoiseFloor NoiseFloorOf(const touches::Observations& observations, const std::vector<double>& best,
+                                double fitted_parameters);
 
 }  // namespace touchstone::diagnosis::selection

@@ -45,11 +45,11 @@ TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
 
 TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
   const touches::SyntheticSet set(5, 48, 1, 0.005, 4);
-  const NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
+  const engine::NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
   EXPECT_FALSE(floor.from_repeats);
-  EXPECT_NEAR(floor.sigma_s, 5000e-6, 400e-6);
-  EXPECT_LT(floor.lower_s, floor.sigma_s);
-  EXPECT_GT(floor.upper_s, floor.sigma_s);
+  EXPECT_NEAR(floor.sigma, 5000e-6, 400e-6);
+  EXPECT_LT(floor.lower, floor.sigma);
+  EXPECT_GT(floor.upper, floor.sigma);
 }
 
 }  // namespace

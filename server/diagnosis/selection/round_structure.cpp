@@ -199,7 +199,7 @@ std::string RoundsInWords(const RoundStructure& rounds, double sigma_s) {
       rounds.translation_m * kMillimetresPerMetre, TimeInWords(sigma_s), TimeInWords(rounds.sigma_s));
 }
 
-void NameRoundFirst(const RoundStructure& rounds, UnexplainedRest* rest) {
+void NameRoundFirst(const RoundStructure& rounds, engine::UnexplainedRest* rest) {
   rest->covariates.insert(rest->covariates.begin(), {"round", rounds.p, rounds.gain_nats});
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
@@ -30,6 +30,6 @@ bool SharesRounds(const RoundStructure& rounds, double sigma_s);
 std::string RoundsInWords(const RoundStructure& rounds, double sigma_s);
 
 // Puts the round in front of the covariates.
-void NameRoundFirst(const RoundStructure& rounds, UnexplainedRest* rest);
+void NameRoundFirst(const RoundStructure& rounds, engine::UnexplainedRest* rest);
 
 }  // namespace touchstone::diagnosis::selection

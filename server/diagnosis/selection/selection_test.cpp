@@ -50,7 +50,7 @@ TEST(SelectExplanation, FindsADriftInAnyNumberOfRepeats) {
     const Selected selected = SelectFor(touches::MakeTestInput(rig));
     EXPECT_EQ(selected.workspace->thinned, rounds == 50);
     ASSERT_EQ(selected.result.steps.size(), 1u);
-    const inference::Fit& fit = selected.result.fit;
+    const engine::Fit& fit = selected.result.fit;
     const int step = selected.result.steps[0].effect;
     EXPECT_EQ(fit.model.base().effects[step].effect->name, "thermal_drift");
     EXPECT_FALSE(selected.result.curve.has_value());

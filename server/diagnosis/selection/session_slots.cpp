@@ -6,12 +6,12 @@
 
 #include "server/base/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/inference/laplace_evidence.h"
+#include "server/diagnosis/engine/laplace_evidence.h"
 
 namespace touchstone::diagnosis::selection {
 
-SessionSlots::SessionSlots(const inference::Experiment& experiment,
-                           const touches::TouchObservationModel& touches, const inference::Fit& fit,
+SessionSlots::SessionSlots(const engine::Experiment& experiment,
+                           const touches::TouchObservationModel& touches, const engine::Fit& fit,
                            const touches::Prediction& details, const CurveCovariate& covariate)
     : likelihood_(*experiment.likelihood),
       touches_(touches),
@@ -48,15 +48,14 @@ void SessionSlots::Divide(std::vector<int> begins) {
       }
       basis_.col(slot * f + c) = touches_.contrasts().Apply(per_finger);
     }
-  const inference::Likelihood::Columns all =
-      inference::Likelihood::Join(fit_.columns, likelihood_.Prepare(basis_));
+  const engine::Likelihood::Columns all = engine::Likelihood::Join(fit_.columns, likelihood_.Prepare(basis_));
   forms_.clear();
   std::vector<double> base;
   for (const int s : hypotheses_) {
     forms_.push_back(MakeForm(likelihood_.Gram(all, s), s));
     base.push_back(LogLikelihood(static_cast<int>(forms_.size()) - 1, 0));
   }
-  base_log_ = inference::LogSum(base);
+  base_log_ = engine::LogSum(base);
 }
 
 double SessionSlots::LogLikelihood(int hypothesis, double drop) const {

@@ -20,9 +20,8 @@ class SessionSlots {
   };
 
   // Everything must outlive it.
-  SessionSlots(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-               const inference::Fit& fit, const touches::Prediction& details,
-               const CurveCovariate& covariate);
+  SessionSlots(const engine::Experiment& experiment, const touches::TouchObservationModel& touches,
+               const engine::Fit& fit, const touches::Prediction& details, const CurveCovariate& covariate);
 
   int touches() const { return static_cast<int>(order_.size()); }
   int columns() const { return o_.fingers - 1; }  // of a slot: fingers 1, 2, ... against the first
@@ -62,10 +61,10 @@ class SessionSlots {
   Form MakeForm(const Eigen::MatrixXd& gram, int s) const;
   void AddSums(Form* form) const;
 
-  const inference::Likelihood& likelihood_;
+  const engine::Likelihood& likelihood_;
   const touches::TouchObservationModel& touches_;
   const touches::Observations& o_;
-  const inference::Fit& fit_;
+  const engine::Fit& fit_;
   const touches::Prediction& details_;
   const CurveCovariate& covariate_;
   std::vector<int> order_;  // touches by the covariate

@@ -10,7 +10,7 @@ namespace touchstone::diagnosis::selection {
 
 struct TestSearch {
   std::unique_ptr<Workspace> workspace;
-  inference::Fit fit;           // of the model as it was given
+  engine::Fit fit;              // of the model as it was given
   touches::Prediction details;  // of the same model, with what covariates need
 };
 
@@ -26,9 +26,9 @@ inline TestSearch PrepareTestSearch(
   EXPECT_TRUE(workspace.ok()) << workspace.status();
   search.workspace = *std::move(workspace);
   EXPECT_TRUE(PrepareSearch(search.workspace.get(), {}).ok());
-  absl::StatusOr<inference::Fit> fit = inference::FitModel(
+  absl::StatusOr<engine::Fit> fit = engine::FitModel(
       search.workspace->experiment,
-      inference::Parameterization(*search.workspace->input.model, search.workspace->searched->objects));
+      engine::Parameterization(*search.workspace->input.model, search.workspace->searched->objects));
   EXPECT_TRUE(fit.ok()) << fit.status();
   search.fit = *std::move(fit);
   absl::StatusOr<touches::Prediction> details =

@@ -8,7 +8,7 @@
 #include "server/base/matern.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/diagnosis/inference/support_points.h"
+#include "server/diagnosis/engine/support_points.h"
 #include "server/effects/surface_map.h"
 
 namespace touchstone::diagnosis::selection {
@@ -24,14 +24,14 @@ double RoundedMm(double value_m, double unit_mm) {
 }
 
 // The posterior of one object's departures at places of support, from the rows of its sites.
-model::SurfaceMapObject MapOfObject(const std::vector<inference::SmoothErrorSite>& sites,
+model::SurfaceMapObject MapOfObject(const std::vector<engine::SmoothErrorSite>& sites,
                                     const std::vector<Eigen::Vector3d>& places, int first_row,
                                     const Eigen::VectorXd& residual, double length_m, double rms_m,
                                     double sigma_s) {
   model::SurfaceMapObject object;
   object.length_mm = RoundedMm(length_m, kMapPlaceUnitMm);
   object.rms_mm = std::max(RoundedMm(rms_m, kMapUnitMm), kMapUnitMm);
-  for (const Eigen::Vector3d& place : inference::SupportPoints(places, kMaxMapPoints)) {
+  for (const Eigen::Vector3d& place : engine::SupportPoints(places, kMaxMapPoints)) {
     model::SurfaceMapPoint point;
     for (int axis = 0; axis < 3; ++axis) point.position_mm[axis] = RoundedMm(place[axis], kMapPlaceUnitMm);
     object.points.push_back(point);
@@ -52,7 +52,7 @@ model::SurfaceMapObject MapOfObject(const std::vector<inference::SmoothErrorSite
   // Rows as functions of the departures' white coordinates u: departures = L u, u ~ N(0, rms^2).
   Eigen::MatrixXd raw = Eigen::MatrixXd::Zero(residual.size(), m);
   Eigen::RowVectorXd nearness(m);
-  for (const inference::SmoothErrorSite& site : sites) {
+  for (const engine::SmoothErrorSite& site : sites) {
     for (int a = 0; a < m; ++a) nearness[a] = Matern52((site.position_m - place_of(a)).norm(), length);
     for (size_t j = 0; j < site.row_per_m.size(); ++j)
       raw.row(site.first_row - first_row + static_cast<int>(j)) += site.row_per_m[j] * nearness;
@@ -74,12 +74,12 @@ model::SurfaceMapObject MapOfObject(const std::vector<inference::SmoothErrorSite
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<const model::Effect>> FitSurfaceMap(const Workspace& workspace,
-                                                                   const inference::Fit& fit,
+                                                                   const engine::Fit& fit,
                                                                    const SurfaceSupport& support) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                               workspace.searched_predictor->Run(fit.model.base(), true, false));
   const PoseEvidence evidence(workspace, fit, details);
-  const inference::SmoothErrorGeometry geometry = evidence.GeometryOf(SurfaceOf(workspace, details));
+  const engine::SmoothErrorGeometry geometry = evidence.GeometryOf(SurfaceOf(workspace, details));
   const std::vector<int> first_rows = evidence.FirstRows(true);
   const std::vector<std::string>& objects = workspace.searched->objects;
   model::SurfaceMapSpec spec;

@@ -8,7 +8,7 @@ namespace touchstone::diagnosis::selection {
 // Of the residuals of `fit`, with the size and the length of the bumps that `support` has found: their posterior mean
 // and standard deviation at the contacts (model/surface_map.md says what holds between them).
 absl::StatusOr<std::shared_ptr<const model::Effect>> FitSurfaceMap(const Workspace& workspace,
-                                                                   const inference::Fit& fit,
+                                                                   const engine::Fit& fit,
                                                                    const SurfaceSupport& support);
 
 }  // namespace touchstone::diagnosis::selection

@@ -15,15 +15,15 @@ namespace {
 constexpr double kLengthError = 0.4;  // relative, of a surface error's length: the grid's spacing
 
 // Size and length, in the units of files. What the bounds of the effect cut off is cut off here too.
-std::vector<inference::ParameterEstimate> DescribeSurface(const model::Effect& effect,
-                                                          const SurfaceErrorFinding& found) {
+std::vector<engine::ParameterEstimate> DescribeSurface(const model::Effect& effect,
+                                                       const SurfaceErrorFinding& found) {
   const std::pair<double, double> values[] = {
       {found.rms_m * kMillimetresPerMetre, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0))},
       {found.length_m * kMillimetresPerMetre, kLengthError}};
-  std::vector<inference::ParameterEstimate> estimates;
+  std::vector<engine::ParameterEstimate> estimates;
   for (const auto& [value, relative_error] : values) {
     const model::ParameterInfo& parameter = effect.parameters[estimates.size()];
-    inference::ParameterEstimate estimate;
+    engine::ParameterEstimate estimate;
     estimate.name = parameter.name;
     estimate.unit = std::string(UnitSymbol(parameter.unit));
     estimate.value = std::clamp(value, parameter.lower, parameter.upper);
@@ -36,29 +36,29 @@ std::vector<inference::ParameterEstimate> DescribeSurface(const model::Effect& e
 }
 
 std::vector<double> SurfaceValues(const model::Effect& effect,
-                                  const std::vector<inference::ParameterEstimate>& estimates) {
+                                  const std::vector<engine::ParameterEstimate>& estimates) {
   std::vector<double> values;
-  for (const inference::ParameterEstimate& estimate : estimates) {
+  for (const engine::ParameterEstimate& estimate : estimates) {
     const model::ParameterInfo& parameter = effect.parameters[values.size()];
     // Two per cent of the values stand for their error.
-    const double rounded = RoundedTo(estimate.value, 0.02 * estimate.value);
+    const double rounded = engine::RoundedTo(estimate.value, 0.02 * estimate.value);
     values.push_back(std::clamp(rounded, parameter.lower, parameter.upper) * kMetresPerMillimetre);
   }
   return values;
 }
 
 // Of surface_error, or of the map in its place.
-LadderStep SurfaceStepOf(const model::Effect& effect, const SelectionResult& selection,
-                         const SurfaceSupport& support) {
+engine::LadderStep SurfaceStepOf(const model::Effect& effect, const SelectionResult& selection,
+                                 const SurfaceSupport& support) {
   const SurfaceErrorFinding& found = selection.surface_error;
   const auto unknown = effects::FindByRole(model::EffectRole::kSmoothError);
-  LadderStep step;
+  engine::LadderStep step;
   step.effect = effect.name;
-  step.scope = EffectScope::kObject;
-  AddTexts(effect, &step);
-  step.probability = std::min(ProbabilityOf(found.gain_nats), support.Probability());
+  step.scope = engine::EffectScope::kObject;
+  engine::AddTexts(effect, &step);
+  step.probability = std::min(engine::ProbabilityOf(found.gain_nats), support.Probability());
   step.gain_nats = found.gain_nats;
-  step.discriminating_measurement = DiscriminatingMeasurement({unknown->name});
+  step.discriminating_measurement = engine::DiscriminatingMeasurement({unknown->name});
   step.parameters = DescribeSurface(*unknown, found);
   return step;
 }
@@ -77,13 +77,13 @@ absl::StatusOr<bool> AddSurfaceMap(const Workspace& workspace, const SelectionRe
   model::Model with = ladder->improved;
   with.effects.push_back({effect, false, {}, {}});
   TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, with));
-  if (!(rmse_s < ladder->final.rmse_s)) return false;
-  LadderStep step = SurfaceStepOf(*effect, selection, support);
-  step.quality.rmse_s = rmse_s;
+  if (!(rmse_s < ladder->final.rmse)) return false;
+  engine::LadderStep step = SurfaceStepOf(*effect, selection, support);
+  step.quality.rmse = rmse_s;
   // Found on the touches of the search, which stand for all.
-  step.quality.heldout_rmse_s = ladder->final.rmse_s * support.left_s / support.before_s;
+  step.quality.heldout_rmse = ladder->final.rmse * support.left_s / support.before_s;
   step.quality.lack_of_fit_p = lack_of_fit_p;
-  step.words = support.WordsOfMap(step.quality.heldout_rmse_s);
+  step.words = support.WordsOfMap(step.quality.heldout_rmse);
   step.model = with;
   TOUCHSTONE_ASSIGN_OR_RETURN(ladder->prediction, workspace.predictor->Run(with, true, true));
   ladder->residuals = touches::Residuals(*workspace.observations, ladder->prediction);
@@ -102,8 +102,8 @@ absl::Status AddSurfaceStep(const Workspace& workspace, const SelectionResult& s
                               AddSurfaceMap(workspace, selection, support, lack_of_fit_p, ladder));
   if (mapped) return absl::OkStatus();
   const auto effect = effects::FindByRole(model::EffectRole::kSmoothError);
-  LadderStep step = SurfaceStepOf(*effect, selection, support);
-  step.words = support.Words(ladder->final.rmse_s);
+  engine::LadderStep step = SurfaceStepOf(*effect, selection, support);
+  step.words = support.Words(ladder->final.rmse);
   // How the bumps lie is not known: the model with them expects what it did without.
   step.quality = ladder->final;
   step.quality.lack_of_fit_p = lack_of_fit_p;
@@ -121,7 +121,7 @@ absl::Status AddSurfaceStep(const Workspace& workspace, const SelectionResult& s
 void RefitSurfaceError(const SurfaceErrorFinding& found, Ladder* ladder) {
   for (model::EffectInstance& instance : ladder->improved.effects) {
     if (instance.effect->role != model::EffectRole::kSmoothError) continue;
-    RefittedEffect refit{instance.effect->name, DescribeSurface(*instance.effect, found)};
+    engine::RefittedEffect refit{instance.effect->name, DescribeSurface(*instance.effect, found)};
     for (size_t p = 0; p < refit.parameters.size(); ++p)
       refit.parameters[p].before = instance.values[p] * kMillimetresPerMetre;
     instance.values = SurfaceValues(*instance.effect, refit.parameters);

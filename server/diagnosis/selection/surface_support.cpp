@@ -81,8 +81,8 @@ void FindCurve(const Workspace& workspace, const touches::Prediction& p, const P
 }
 
 // Whole poses left out: the effects fitted without them, the surface predicted there.
-void PredictPoses(const PoseEvidence& evidence, const inference::Fit& fit,
-                  const inference::Likelihood& likelihood, int hypothesis, SurfaceSupport* support) {
+void PredictPoses(const PoseEvidence& evidence, const engine::Fit& fit, const engine::Likelihood& likelihood,
+                  int hypothesis, SurfaceSupport* support) {
   std::vector<int> fold_of_row;
   for (const PoseMean& mean : evidence.means())
     fold_of_row.insert(fold_of_row.end(), mean.mean.rows(), mean.pose % kSurfaceFolds);
@@ -195,7 +195,7 @@ PoseFunction SurfaceOf(const Workspace& workspace, const touches::Prediction& de
   return field;
 }
 
-absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, const inference::Fit& fit) {
+absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, const engine::Fit& fit) {
   SurfaceSupport support;
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                               workspace.searched_predictor->Run(fit.model.base(), true, false));
@@ -208,14 +208,14 @@ absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, co
   };
   int best = 0, best_finger = 0;
   double sigma_finger_s = 0;
-  const inference::Likelihood likelihood = evidence.LikelihoodOf(field);
+  const engine::Likelihood likelihood = evidence.LikelihoodOf(field);
   support.field_nats = evidence.NatsOf(likelihood, &best, &support.sigma_s);
   support.finger_field_nats =
       evidence.NatsOf(evidence.LikelihoodOf(per_finger), &best_finger, &sigma_finger_s);
   support.own_nats = std::max(evidence.NatsOfOwnErrors(PoseEvidence::OwnError::kAlongNormal),
                               evidence.NatsOfOwnErrors(PoseEvidence::OwnError::kAlongSurface));
   FindCurve(workspace, details, evidence, &support);
-  const inference::SurfaceErrorHypothesis& hypothesis = likelihood.hypotheses()[best];
+  const engine::SurfaceErrorHypothesis& hypothesis = likelihood.hypotheses()[best];
   support.rms_m = hypothesis.amplitude_over_sigma * support.sigma_s;
   support.length_m = hypothesis.length_m;
   support.shortest = hypothesis.length_index == 0;

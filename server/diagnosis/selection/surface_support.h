@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/selection/pose_evidence.h"
 #include "server/diagnosis/selection/workspace.h"
 
@@ -45,6 +45,6 @@ struct SurfaceSupport {
 PoseFunction SurfaceOf(const Workspace& workspace, const touches::Prediction& details);
 
 // Of the residuals of `fit`, on the touches of the search.
-absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, const inference::Fit& fit);
+absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, const engine::Fit& fit);
 
 }  // namespace touchstone::diagnosis::selection

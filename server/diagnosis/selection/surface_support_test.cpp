@@ -22,8 +22,8 @@ SurfaceSupport SupportIn(const DiagnosisInput& input) {
   auto workspace = MakeWorkspace(input, {});
   EXPECT_TRUE(workspace.ok()) << workspace.status();
   EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
-  const auto fit = inference::FitModel(
-      (*workspace)->experiment, inference::Parameterization(*input.model, (*workspace)->searched->objects));
+  const auto fit = engine::FitModel((*workspace)->experiment,
+                                    engine::Parameterization(*input.model, (*workspace)->searched->objects));
   EXPECT_TRUE(fit.ok()) << fit.status();
   const auto support = FindSurfaceSupport(**workspace, *fit);
   EXPECT_TRUE(support.ok()) << support.status();

@@ -8,18 +8,18 @@
 
 namespace touchstone::diagnosis::selection {
 
-TermScorer::TermScorer(const inference::Experiment& experiment, const inference::Fit& fit)
+TermScorer::TermScorer(const engine::Experiment& experiment, const engine::Fit& fit)
     : likelihood_(*experiment.likelihood), fit_(fit) {
   std::vector<int> members(1 + fit.model.size());
   std::iota(members.begin(), members.end(), 0);
-  base_log_ = inference::ComputeLaplaceEvidence(likelihood_, inference::Grams(likelihood_, fit.columns),
-                                                members, fit.model.parameters(), fit.point)
+  base_log_ = engine::ComputeLaplaceEvidence(likelihood_, engine::Grams(likelihood_, fit.columns), members,
+                                             fit.model.parameters(), fit.point)
                   .log_likelihood;
 }
 
 TermScores TermScorer::Score(const Eigen::MatrixXd& columns, int width,
                              const std::vector<double>& scales) const {
-  const inference::Likelihood::Columns prepared = likelihood_.Prepare(columns);
+  const engine::Likelihood::Columns prepared = likelihood_.Prepare(columns);
   const int blocks = static_cast<int>(columns.cols()) / width;
   TermScores scores;
   scores.step.setZero(width, blocks);
@@ -45,7 +45,7 @@ TermScores TermScorer::Score(const Eigen::MatrixXd& columns, int width,
   return scores;
 }
 
-TermScorer::Projection TermScorer::Project(const inference::Likelihood::Columns& prepared, int width,
+TermScorer::Projection TermScorer::Project(const engine::Likelihood::Columns& prepared, int width,
                                            int s) const {
   const int p = fit_.model.size();
   const Eigen::MatrixXd own = likelihood_.Gram(fit_.columns, s);
@@ -64,8 +64,8 @@ TermScorer::Projection TermScorer::Project(const inference::Likelihood::Columns&
   if (width == 2) {
     projection.inner.resize(projection.norms.size() / 2);
     for (int b = 0; b < projection.inner.size(); ++b)
-      projection.inner[b] = likelihood_.Cross(inference::Likelihood::Pick(prepared, {2 * b}),
-                                              inference::Likelihood::Pick(prepared, {2 * b + 1}), s)(0, 0);
+      projection.inner[b] = likelihood_.Cross(engine::Likelihood::Pick(prepared, {2 * b}),
+                                              engine::Likelihood::Pick(prepared, {2 * b + 1}), s)(0, 0);
   }
   return projection;
 }

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -19,7 +19,7 @@ struct TermScores {
 // `experiment` and `fit` must outlive it.
 class TermScorer {
  public:
-  TermScorer(const inference::Experiment& experiment, const inference::Fit& fit);
+  TermScorer(const engine::Experiment& experiment, const engine::Fit& fit);
 
   // Blocks of `width` (1 or 2) columns. `scales`: of each column's value, the width of its prior.
   TermScores Score(const Eigen::MatrixXd& columns, int width, const std::vector<double>& scales) const;
@@ -40,12 +40,12 @@ class TermScorer {
     Eigen::VectorXd step;
   };
 
-  Projection Project(const inference::Likelihood::Columns& prepared, int width, int s) const;
+  Projection Project(const engine::Likelihood::Columns& prepared, int width, int s) const;
   BlockFit FitBlock(const Projection& projection, int b, int width, const std::vector<double>& scales,
                     int s) const;
 
-  const inference::Likelihood& likelihood_;
-  const inference::Fit& fit_;
+  const engine::Likelihood& likelihood_;
+  const engine::Fit& fit_;
   double base_log_ = 0;  // log likelihood of the fit without a term: scale of the sums
 };
 

@@ -7,7 +7,7 @@
 
 #include "server/base/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/inference/laplace_evidence.h"
+#include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/selection/candidate_course.h"
 #include "server/diagnosis/selection/held_out_curve.h"
 #include "server/diagnosis/selection/session_slots.h"
@@ -28,8 +28,8 @@ constexpr double kWorthRefiningNats = 3;
 
 class CourseScorer {
  public:
-  CourseScorer(const inference::Experiment& experiment, const touches::TouchObservationModel& touches,
-               const inference::Fit& fit, const touches::Prediction& details, const CurveCovariate& covariate)
+  CourseScorer(const engine::Experiment& experiment, const touches::TouchObservationModel& touches,
+               const engine::Fit& fit, const touches::Prediction& details, const CurveCovariate& covariate)
       : experiment_(experiment),
         touches_(touches),
         fit_(fit),
@@ -108,7 +108,7 @@ class CourseScorer {
         }
     }
     if (tried == 0) return -INFINITY;
-    return inference::LogSum(logs) - std::log(places > 0 ? places : tried) - slots_.base_log();
+    return engine::LogSum(logs) - std::log(places > 0 ? places : tried) - slots_.base_log();
   }
 
   // All waves of whole and half cycles; near one of them if it is given.
@@ -153,7 +153,7 @@ class CourseScorer {
       Evaluate(products, &course);
       logs.push_back(course.log_evidence);
     }
-    return inference::LogSum(logs) - slots_.base_log();
+    return engine::LogSum(logs) - slots_.base_log();
   }
 
   void HoldOut(const CandidateCourse& course, NamelessCurve* curve) const {
@@ -226,12 +226,12 @@ class CourseScorer {
       logs.push_back(slots_.LogLikelihood(h, n / (n + 1) * drop) - 0.5 * dof * std::log1p(n));
       if (logs.back() > best) best = logs.back(), course->values = values;
     }
-    course->log_evidence = inference::LogSum(logs) + LogShare(course->finger);
+    course->log_evidence = engine::LogSum(logs) + LogShare(course->finger);
   }
 
-  const inference::Experiment& experiment_;
+  const engine::Experiment& experiment_;
   const touches::TouchObservationModel& touches_;
-  const inference::Fit& fit_;
+  const engine::Fit& fit_;
   const CurveCovariate& covariate_;
   const int fingers_;
   SessionSlots slots_;
@@ -239,8 +239,8 @@ class CourseScorer {
 
 }  // namespace
 
-TimeCourses ScoreTimeCourses(const inference::Experiment& experiment,
-                             const touches::TouchObservationModel& touches, const inference::Fit& fit,
+TimeCourses ScoreTimeCourses(const engine::Experiment& experiment,
+                             const touches::TouchObservationModel& touches, const engine::Fit& fit,
                              const touches::Prediction& details, const CurveCovariate& covariate) {
   TimeCourses courses;
   CourseScorer scorer(experiment, touches, fit, details, covariate);

@@ -19,8 +19,8 @@ struct TimeCourses {
   // Of a constant and of a straight line of one finger: what a named effect of the catalogue says in fewer values.
   double one_finger_constant_nats = -INFINITY, one_finger_line_nats = -INFINITY;
 };
-TimeCourses ScoreTimeCourses(const inference::Experiment& experiment,
-                             const touches::TouchObservationModel& touches, const inference::Fit& fit,
+TimeCourses ScoreTimeCourses(const engine::Experiment& experiment,
+                             const touches::TouchObservationModel& touches, const engine::Fit& fit,
                              const touches::Prediction& details, const CurveCovariate& covariate);
 
 }  // namespace touchstone::diagnosis::selection

@@ -25,7 +25,7 @@ std::vector<NamelessCurve> CoursesOfRig(const std::vector<std::string>& lookup, 
   EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
   const Workspace& w = **workspace;
   const auto fit =
-      inference::FitModel(w.experiment, inference::Parameterization(*w.input.model, w.searched->objects));
+      engine::FitModel(w.experiment, engine::Parameterization(*w.input.model, w.searched->objects));
   EXPECT_TRUE(fit.ok());
   const auto details = w.searched_predictor->Run(fit->model.base(), true, true);
   const std::vector<CurveCovariate> covariates = ListCurveCovariates(*w.searched, *details);

@@ -142,24 +142,25 @@ TimeStructure FindTimeStructure(const touches::Observations& o, const std::vecto
 }
 
 void AddTimeStructure(const touches::Observations& o, const std::vector<double>& residuals,
-                      NoiseFloor* floor) {
+                      engine::NoiseFloor* floor) {
   const TimeStructure found = FindTimeStructure(o, residuals);
-  floor->sigma_without_time_s = found.sigma_s;
+  floor->sigma_without_time = found.sigma_s;
   floor->time_structure_z = found.z;
   floor->time_structure_p = found.p;
 }
 
-bool SharesTime(const NoiseFloor& floor) {
+bool SharesTime(const engine::NoiseFloor& floor) {
   return floor.from_repeats && floor.time_structure_p < kTimeStructureP &&
-         floor.sigma_without_time_s < (1 - kNegligibleTime) * floor.sigma_s;
+         floor.sigma_without_time < (1 - kNegligibleTime) * floor.sigma;
 }
 
-void NameTimeFirst(const touches::Observations& o, const NoiseFloor& floor, UnexplainedRest* rest) {
-  CovariateTest time = {o.set->has_session_time ? "session_time_s" : "touch", floor.time_structure_p,
-                        0.5 * floor.time_structure_z * floor.time_structure_z};
-  std::vector<CovariateTest>& tests = rest->covariates;
+void NameTimeFirst(const touches::Observations& o, const engine::NoiseFloor& floor,
+                   engine::UnexplainedRest* rest) {
+  engine::CovariateTest time = {o.set->has_session_time ? "session_time_s" : "touch", floor.time_structure_p,
+                                0.5 * floor.time_structure_z * floor.time_structure_z};
+  std::vector<engine::CovariateTest>& tests = rest->covariates;
   const auto same = std::find_if(tests.begin(), tests.end(),
-                                 [&](const CovariateTest& test) { return test.name == time.name; });
+                                 [&](const engine::CovariateTest& test) { return test.name == time.name; });
   if (same != tests.end()) {
     time = *same;
     tests.erase(same);

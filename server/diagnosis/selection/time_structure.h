@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "server/diagnosis/selection/result.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {
@@ -28,12 +28,13 @@ TimeStructure FindTimeStructure(const touches::Observations& observations,
 
 // The floor's figures on time.
 void AddTimeStructure(const touches::Observations& observations, const std::vector<double>& residuals,
-                      NoiseFloor* floor);
+                      engine::NoiseFloor* floor);
 
 // Whether the floor holds a course in time that is neither chance nor negligible.
-bool SharesTime(const NoiseFloor& floor);
+bool SharesTime(const engine::NoiseFloor& floor);
 
 // Puts the place in the session in front of the covariates.
-void NameTimeFirst(const touches::Observations& observations, const NoiseFloor& floor, UnexplainedRest* rest);
+void NameTimeFirst(const touches::Observations& observations, const engine::NoiseFloor& floor,
+                   engine::UnexplainedRest* rest);
 
 }  // namespace touchstone::diagnosis::selection

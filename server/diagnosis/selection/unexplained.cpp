@@ -32,104 +32,110 @@ double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const E
 }
 
 // The formula as it stands in a model file.
-std::string FormulaYaml(const inference::Fit& fit, int index) {
+std::string FormulaYaml(const engine::Fit& fit, int index) {
   model::Model only = fit.model.base();
   only.effects = {only.effects[index]};
   model::EffectInstance& instance = only.effects[0];
   size_t at_value = 0;  // a formula's parameters are numbers
-  for (const inference::ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
+  for (const engine::ParameterEstimate& estimate : fit.model.Describe(index, fit.point, fit.covariance)) {
     const model::ParameterInfo& parameter = instance.effect->parameters[at_value];
-    instance.values[at_value++] = ToSi(parameter.unit, RoundedTo(estimate.value, estimate.std_error));
+    instance.values[at_value++] = ToSi(parameter.unit, engine::RoundedTo(estimate.value, estimate.std_error));
   }
-  return EffectYaml(only, std::move(only.effects[0]));
+  return engine::EffectYaml(only, std::move(only.effects[0]));
 }
 
 // Each covariate by its best term, the number of terms paid for; those that chance hardly brings about, largest
 // gain first. `first`: a covariate that stands before all others; empty: none.
-std::vector<CovariateTest> TestCovariates(const std::vector<FormulaTerm>& terms, const std::string& first) {
-  std::map<std::string, CovariateTest> tests;
+std::vector<engine::CovariateTest> TestCovariates(const std::vector<FormulaTerm>& terms,
+                                                  const std::string& first) {
+  std::map<std::string, engine::CovariateTest> tests;
   for (const FormulaTerm& term : terms) {
     const double tail = ChiSquaredTail(2 * term.log_ratio, term.degrees_of_freedom);
     const double p = std::min(1.0, tail * static_cast<double>(terms.size()));
-    CovariateTest& test = tests[term.covariate];
+    engine::CovariateTest& test = tests[term.covariate];
     if (!test.name.empty() && test.gain_nats >= term.gain_nats) continue;
     test = {term.covariate, p, term.gain_nats};
   }
-  std::vector<CovariateTest> sorted;
+  std::vector<engine::CovariateTest> sorted;
   for (auto& [name, test] : tests) sorted.push_back(std::move(test));
   std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const CovariateTest& a, const CovariateTest& b) { return a.gain_nats > b.gain_nats; });
+                   [](const engine::CovariateTest& a, const engine::CovariateTest& b) {
+                     return a.gain_nats > b.gain_nats;
+                   });
   std::stable_partition(sorted.begin(), sorted.end(),
-                        [&](const CovariateTest& test) { return test.name == first; });
-  std::vector<CovariateTest> kept;
-  for (const CovariateTest& test : sorted)
+                        [&](const engine::CovariateTest& test) { return test.name == first; });
+  std::vector<engine::CovariateTest> kept;
+  for (const engine::CovariateTest& test : sorted)
     if (kept.size() < kMaxCovariates && test.p < kCovariateP) kept.push_back(test);
   return kept;
 }
 
 // The formula, its values, and what it would do.
 absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& selection,
-                             const Quality& final, double floor_s, UnexplainedRest* rest) {
-  const inference::Fit& fit = selection.fit;
+                             const engine::Quality& final, double floor_s, engine::UnexplainedRest* rest) {
+  const engine::Fit& fit = selection.fit;
   const model::EffectInstance& instance = fit.model.base().effects[selection.formula];
   rest->formula = instance.effect->formula->expression;
   rest->formula_yaml = FormulaYaml(fit, selection.formula);
   rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                               workspace.predictor->Run(fit.model.base(), false, false));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Quality quality,
                               QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with)));
-  rest->rmse_s = quality.rmse_s;
-  rest->heldout_rmse_s = quality.heldout_rmse_s;
-  const double before = std::pow(final.heldout_rmse_s, 2) - floor_s * floor_s;
-  const double after = std::pow(quality.heldout_rmse_s, 2) - floor_s * floor_s;
+  rest->rmse = quality.rmse;
+  rest->heldout_rmse = quality.heldout_rmse;
+  const double before = std::pow(final.heldout_rmse, 2) - floor_s * floor_s;
+  const double after = std::pow(quality.heldout_rmse, 2) - floor_s * floor_s;
   rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
   return absl::OkStatus();
 }
 
 // What the curve in the model does; errors on unseen touches are refitted without parts of them.
-absl::Status DescribeCurve(const Workspace& workspace, const SelectionResult& selection, const Quality& final,
-                           double floor_s, UnexplainedRest* rest) {
+absl::Status DescribeCurve(const Workspace& workspace, const SelectionResult& selection,
+                           const engine::Quality& final, double floor_s, engine::UnexplainedRest* rest) {
   const NamelessCurve& curve = *selection.curve;
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                               workspace.predictor->Run(selection.fit.model.base(), false, false));
   const touches::Observations& o = *workspace.observations;
-  rest->rmse_s = touches::Rmse(o, touches::Residuals(o, with));
+  rest->rmse = touches::Rmse(o, touches::Residuals(o, with));
   const double in_sample = std::sqrt(selection.fit.columns.values.col(0).squaredNorm() /
                                      std::max<double>(1, selection.fit.columns.values.rows()));
   const double ratio = in_sample > 0 ? std::max(1.0, curve.heldout_with_s / in_sample) : 1;
-  rest->heldout_rmse_s = rest->rmse_s * ratio;
-  const double before = std::pow(final.rmse_s, 2) - floor_s * floor_s;
-  const double after = std::pow(rest->heldout_rmse_s, 2) - floor_s * floor_s;
+  rest->heldout_rmse = rest->rmse * ratio;
+  const double before = std::pow(final.rmse, 2) - floor_s * floor_s;
+  const double after = std::pow(rest->heldout_rmse, 2) - floor_s * floor_s;
   rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
   return absl::OkStatus();
 }
 
 // Curves among the covariates: the one that explains the rest first, then those that gain most.
-void AddCurves(const SelectionResult& selection, std::vector<CovariateTest>* tests) {
+void AddCurves(const SelectionResult& selection, std::vector<engine::CovariateTest>* tests) {
   for (const NamelessCurve& curve : selection.curves) {
     if (!IsSignificant(curve)) continue;
-    const CovariateTest found = {curve.covariate, curve.p, curve.gain_nats};
-    const auto same = std::find_if(tests->begin(), tests->end(),
-                                   [&](const CovariateTest& test) { return test.name == found.name; });
+    const engine::CovariateTest found = {curve.covariate, curve.p, curve.gain_nats};
+    const auto same = std::find_if(tests->begin(), tests->end(), [&](const engine::CovariateTest& test) {
+      return test.name == found.name;
+    });
     if (same == tests->end())
       tests->push_back(found);
     else if (same->gain_nats < found.gain_nats)
       *same = found;
   }
   std::stable_sort(tests->begin(), tests->end(),
-                   [](const CovariateTest& a, const CovariateTest& b) { return a.gain_nats > b.gain_nats; });
+                   [](const engine::CovariateTest& a, const engine::CovariateTest& b) {
+                     return a.gain_nats > b.gain_nats;
+                   });
   if (selection.curve) {
     const std::string& first = selection.curve->covariate;
     std::stable_partition(tests->begin(), tests->end(),
-                          [&](const CovariateTest& test) { return test.name == first; });
+                          [&](const engine::CovariateTest& test) { return test.name == first; });
   }
   if (tests->size() > kMaxCovariates) tests->resize(kMaxCovariates);
 }
 
 // The term of the curve's covariate that gains most, if it is worth a look, and how much of the curve's gain that is.
 void AddNearestFormula(const std::vector<FormulaTerm>& terms, const NamelessCurve& curve,
-                       UnexplainedRest* rest) {
+                       engine::UnexplainedRest* rest) {
   const FormulaTerm* nearest = nullptr;
   for (const FormulaTerm& term : terms)
     if (term.covariate == curve.covariate && (nearest == nullptr || term.gain_nats > nearest->gain_nats))
@@ -142,9 +148,9 @@ void AddNearestFormula(const std::vector<FormulaTerm>& terms, const NamelessCurv
 
 // What of the catalogue looks most like the formula.
 absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult& selection,
-                               UnexplainedRest* rest) {
-  const inference::Fit& fit = selection.fit;
-  const inference::Fit& without = selection.without_formula;
+                               engine::UnexplainedRest* rest) {
+  const engine::Fit& fit = selection.fit;
+  const engine::Fit& without = selection.without_formula;
   const int own = without.model.size();
   const Eigen::MatrixXd others = without.columns.values.rightCols(own);
   Eigen::VectorXd column;
@@ -155,13 +161,13 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
   if (fit.model.base().effects[selection.formula].effect->lookup != nullptr)
     column = without.columns.values.col(0) - fit.columns.values.col(0);
   if (column.size() == 0) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::Extension> extensions,
                               selection.search->Score(without, selection.initial_effects));
-  for (const Extension& extension : extensions) {
+  for (const engine::Extension& extension : extensions) {
     if (extension.candidate < 0 || !extension.visible || !extension.object.empty()) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
-                                inference::Derivatives(workspace.experiment, extension.start,
-                                                       extension.start.Start(), without.predicted, own));
+                                engine::Derivatives(workspace.experiment, extension.start,
+                                                    extension.start.Start(), without.predicted, own));
     if (span.cols() > kMaxSpan) continue;
     const double cosine = Cosine(others, column, span);
     if (cosine <= rest->nearest_cosine) continue;
@@ -173,17 +179,9 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
 
 }  // namespace
 
-std::string EffectYaml(model::Model model, model::EffectInstance instance) {
-  model.effects = {std::move(instance)};
-  const std::string text = model::FormatModel(model);
-  const size_t at = text.find("effects:");
-  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
-  return line == std::string::npos ? text : text.substr(line + 1);
-}
-
-absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
-                                                    const SelectionResult& selection, const Quality& final,
-                                                    double floor_s) {
+absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
+                                                            const SelectionResult& selection,
+                                                            const engine::Quality& final, double floor_s) {
   std::vector<FormulaTerm> terms = selection.terms;
   if (terms.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
@@ -191,13 +189,13 @@ absl::StatusOr<UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
     terms = ScoreTerms(workspace.experiment, *workspace.rows, selection.fit, details);
   }
   const bool has_formula = selection.formula >= 0;
-  UnexplainedRest rest;
+  engine::UnexplainedRest rest;
   rest.covariates = TestCovariates(terms, has_formula ? selection.term.covariate : "");
   AddCurves(selection, &rest.covariates);
   if (selection.curve) {
     const auto effect = MakeCurveEffect(*selection.curve);
     if (effect.ok()) {
-      rest.lookup_yaml = EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
+      rest.lookup_yaml = engine::EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
       rest.lookup = *effect;
       AddNearestFormula(terms, *selection.curve, &rest);
     }

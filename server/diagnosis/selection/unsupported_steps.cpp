@@ -1,24 +1,24 @@
 #include "server/diagnosis/selection/unsupported_steps.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/inference/held_out.h"
+#include "server/diagnosis/engine/held_out.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kImprobable = 0.05;  // of a step, with its equivalents
 
-bool HasOwnValues(const inference::Fit& fit, int index) {
+bool HasOwnValues(const engine::Fit& fit, int index) {
   return fit.model.base().effects[index].per_object;
 }
 
-double UnseenError(const Workspace& workspace, const inference::Fit& fit, bool by_block) {
-  return by_block ? inference::HeldOutRmseByBlock(workspace.experiment, fit)
-                  : inference::HeldOutRmse(workspace.experiment, fit);
+double UnseenError(const Workspace& workspace, const engine::Fit& fit, bool by_block) {
+  return by_block ? engine::HeldOutRmseByBlock(workspace.experiment, fit)
+                  : engine::HeldOutRmse(workspace.experiment, fit);
 }
 
 // The explanation without effect `index`, everything else fitted anew.
-absl::Status TakeOut(const Workspace& workspace, int index, inference::Fit without, SelectionResult* result) {
+absl::Status TakeOut(const Workspace& workspace, int index, engine::Fit without, SelectionResult* result) {
   result->fit = std::move(without);
   if (result->formula < 0) {
     result->without_formula = result->fit;
@@ -27,7 +27,7 @@ absl::Status TakeOut(const Workspace& workspace, int index, inference::Fit witho
   if (index < result->formula) --result->formula;
   TOUCHSTONE_ASSIGN_OR_RETURN(
       result->without_formula,
-      inference::FitModel(workspace.experiment, result->fit.model.Without(result->formula)));
+      engine::FitModel(workspace.experiment, result->fit.model.Without(result->formula)));
   return absl::OkStatus();
 }
 
@@ -37,8 +37,8 @@ absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
   for (int index = static_cast<int>(result->fit.model.base().effects.size()) - 1;
        index >= result->initial_effects; --index) {
     if (index == result->formula) continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(inference::Fit without,
-                                inference::FitModel(workspace.experiment, result->fit.model.Without(index)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
+                                engine::FitModel(workspace.experiment, result->fit.model.Without(index)));
     // Values of single objects cannot be predicted from other objects.
     bool by_block = false;
     for (int other = 0; other < static_cast<int>(result->fit.model.base().effects.size()); ++other)
@@ -55,8 +55,7 @@ absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult*
   for (auto step = result->steps.rbegin(); step != result->steps.rend(); ++step) {
     if (step->probability >= kImprobable) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        inference::Fit without,
-        inference::FitModel(workspace.experiment, result->fit.model.Without(step->effect)));
+        engine::Fit without, engine::FitModel(workspace.experiment, result->fit.model.Without(step->effect)));
     TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, step->effect, std::move(without), result));
     dropped = true;
   }

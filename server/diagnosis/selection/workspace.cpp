@@ -276,14 +276,14 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
   double slope = 0;  // s/m
   for (const int k : workspace->contrasts->touches()) slope += 1 / searched.set->speed_m_s[searched.row[k]];
   slope /= std::max<size_t>(workspace->contrasts->touches().size(), 1);
-  const inference::SmoothErrorGeometry geometry =
+  const engine::SmoothErrorGeometry geometry =
       touches::SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
-  workspace->likelihood = std::make_unique<inference::Likelihood>(
+  workspace->likelihood = std::make_unique<engine::Likelihood>(
       touches::FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())),
       &geometry, kFloorM * slope, workspace->context.pool);
   workspace->rows = std::make_unique<touches::TouchObservationModel>(
       searched, *workspace->searched_predictor, *workspace->contrasts, workspace->searched_nominal.time_s);
-  inference::Experiment& experiment = workspace->experiment;
+  engine::Experiment& experiment = workspace->experiment;
   experiment.observations = workspace->rows.get();
   experiment.likelihood = workspace->likelihood.get();
   experiment.pool = workspace->context.pool;

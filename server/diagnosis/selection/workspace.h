@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/inference/fit.h"
+#include "server/diagnosis/engine/fit.h"
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
@@ -35,8 +35,8 @@ struct Workspace {
   touches::Prediction searched_nominal;
   std::unique_ptr<touches::Contrasts> contrasts;
   std::unique_ptr<touches::TouchObservationModel> rows;
-  std::unique_ptr<inference::Likelihood> likelihood;
-  inference::Experiment experiment;
+  std::unique_ptr<engine::Likelihood> likelihood;
+  engine::Experiment experiment;
   bool thinned = false;
 };
 

@@ -10,12 +10,12 @@ namespace {
 constexpr double kMaxTangent = 10;
 constexpr size_t kMaxDelays = 6000;
 
-std::vector<inference::ReadingGroup> GroupsOf(const Observations& o, const std::vector<double>& residuals_s,
-                                              const std::vector<double>& tan_incidence) {
-  std::vector<inference::ReadingGroup> groups;
+std::vector<ReadingGroup> GroupsOf(const Observations& o, const std::vector<double>& residuals_s,
+                                   const std::vector<double>& tan_incidence) {
+  std::vector<ReadingGroup> groups;
   for (int k = 0; k < o.size(); ++k) {
     if (!o.used[k]) continue;
-    inference::ReadingGroup group;
+    ReadingGroup group;
     group.index = k;
     for (int i = 0; i < o.fingers; ++i) {
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
@@ -30,33 +30,32 @@ std::vector<inference::ReadingGroup> GroupsOf(const Observations& o, const std::
 }
 
 // Sets the slowness of every group; returns what it is relative to.
-double SetSlowness(const Observations& o, std::vector<inference::ReadingGroup>* groups) {
+double SetSlowness(const Observations& o, std::vector<ReadingGroup>* groups) {
   double squares = 0;
-  for (inference::ReadingGroup& group : *groups) {
+  for (ReadingGroup& group : *groups) {
     group.slowness = 1 / o.set->speed_m_s[o.row[group.index]];
     squares += group.slowness * group.slowness;
   }
   const double root_mean_square = std::sqrt(squares / std::max<size_t>(groups->size(), 1));
-  for (inference::ReadingGroup& group : *groups) group.slowness /= root_mean_square;
+  for (ReadingGroup& group : *groups) group.slowness /= root_mean_square;
   return root_mean_square;
 }
 
 // Residuals of repeats (one pose, the same fingers) less their mean, enlarged by what the mean has followed.
-std::vector<inference::ReadingGroup> RepeatsOf(const Observations& o,
-                                               const std::vector<inference::ReadingGroup>& groups) {
+std::vector<ReadingGroup> RepeatsOf(const Observations& o, const std::vector<ReadingGroup>& groups) {
   struct Mean {
     double touches = 0;
     std::vector<double> sum_s;
   };
   std::map<std::pair<int, std::vector<int>>, Mean> means;
-  for (const inference::ReadingGroup& group : groups) {
+  for (const ReadingGroup& group : groups) {
     Mean& mean = means[{o.pose[group.index], group.channel}];
     mean.sum_s.resize(group.residual_s.size());
     ++mean.touches;
     for (size_t i = 0; i < group.residual_s.size(); ++i) mean.sum_s[i] += group.residual_s[i];
   }
-  std::vector<inference::ReadingGroup> repeats;
-  for (const inference::ReadingGroup& group : groups) {
+  std::vector<ReadingGroup> repeats;
+  for (const ReadingGroup& group : groups) {
     const Mean& mean = means[{o.pose[group.index], group.channel}];
     if (mean.touches < 2) continue;
     repeats.push_back(group);
@@ -86,17 +85,17 @@ std::vector<double> DelaysOf(const Observations& o) {
 }
 
 // Contacts of one finger at one pose.
-std::vector<inference::RepeatedReading> RepeatedOf(const Observations& o, const std::vector<char>& expected) {
-  std::map<std::pair<int, int>, inference::RepeatedReading> by_pose_and_finger;
+std::vector<RepeatedReading> RepeatedOf(const Observations& o, const std::vector<char>& expected) {
+  std::map<std::pair<int, int>, RepeatedReading> by_pose_and_finger;
   for (int k = 0; k < o.size(); ++k)
     for (int i = 0; i < o.fingers; ++i) {
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
       if (!expected[e]) continue;
-      inference::RepeatedReading& reading = by_pose_and_finger[{o.pose[k], i}];
+      RepeatedReading& reading = by_pose_and_finger[{o.pose[k], i}];
       reading.expected += 1;
       reading.silent += std::isnan(o.time_s[e]);
     }
-  std::vector<inference::RepeatedReading> repeated;
+  std::vector<RepeatedReading> repeated;
   for (const auto& [key, reading] : by_pose_and_finger) repeated.push_back(reading);
   return repeated;
 }
@@ -122,11 +121,9 @@ std::vector<double> TangentsOfIncidence(const Prediction& prediction) {
   return tangents;
 }
 
-inference::NoiseSample MakeNoiseSample(const Observations& observations,
-                                       const std::vector<double>& residuals_s,
-                                       const std::vector<double>& tan_incidence,
-                                       const std::vector<char>& expected) {
-  inference::NoiseSample sample;
+NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
+                            const std::vector<double>& tan_incidence, const std::vector<char>& expected) {
+  NoiseSample sample;
   sample.groups = GroupsOf(observations, residuals_s, tan_incidence);
   sample.rms_slowness_s_per_m = SetSlowness(observations, &sample.groups);
   sample.repeats = RepeatsOf(observations, sample.groups);

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/diagnosis/inference/noise_kinds.h"
+#include "server/diagnosis/touches/noise_kinds.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 
@@ -19,9 +19,7 @@ std::vector<double> TangentsOfIncidence(const Prediction& prediction);
 // residuals_s: what is left, less any surface error; tan_incidence: of every finger; both [k * fingers + i], NaN
 // where a finger takes no part. expected: whether the model expects the finger to report. Only touches that are
 // used count. Groups carry the touch as their index.
-inference::NoiseSample MakeNoiseSample(const Observations& observations,
-                                       const std::vector<double>& residuals_s,
-                                       const std::vector<double>& tan_incidence,
-                                       const std::vector<char>& expected);
+NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
+                            const std::vector<double>& tan_incidence, const std::vector<char>& expected);
 
 }  // namespace touchstone::diagnosis::touches

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSigma = 0.005;
 
 template <typename Draw>
-inference::NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
+NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
   SyntheticSet set(5, 48, 4, 0, seed);
   std::vector<double> tangents(set.observations.time_s.size());
   for (size_t e = 0; e < tangents.size(); ++e) {
@@ -23,14 +23,14 @@ inference::NoiseFindings FindIn(Draw draw, uint64_t seed = 3) {
     set.observations.time_s[e] += draw(tangents[e]);
   }
   set.Finish();
-  return inference::FindNoise(
+  return FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
 }
 
 TEST(FindNoise, MeasuresPlainNoiseAndClaimsNothingElse) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0, kSigma);
-  const inference::NoiseFindings found = FindIn([&](double) { return normal(random); });
+  const NoiseFindings found = FindIn([&](double) { return normal(random); });
   EXPECT_NEAR(found.sigma_s.value, kSigma, 4 * found.sigma_s.std_error);
   EXPECT_EQ(found.slope.gain_nats, 0);
   EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
@@ -43,7 +43,7 @@ TEST(FindNoise, MeasuresHeavyTails) {
   TOUCHSTONE_SECOND_TIER("statistical: several sets");
   std::mt19937_64 random(2);
   std::student_t_distribution<double> student(3);
-  const inference::NoiseFindings found = FindIn([&](double) { return kSigma * student(random); });
+  const NoiseFindings found = FindIn([&](double) { return kSigma * student(random); });
   EXPECT_NEAR(found.degrees_of_freedom.value, 3, 3 * found.degrees_of_freedom.std_error);
   EXPECT_NEAR(found.sigma_s.value, kSigma, 0.1 * kSigma);
   EXPECT_FALSE(found.weights.empty());
@@ -52,8 +52,7 @@ TEST(FindNoise, MeasuresHeavyTails) {
 TEST(FindNoise, MeasuresNoiseThatGrowsOnSlopes) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0, kSigma);
-  const inference::NoiseFindings found =
-      FindIn([&](double tangent) { return (1 + 3 * tangent) * normal(random); });
+  const NoiseFindings found = FindIn([&](double tangent) { return (1 + 3 * tangent) * normal(random); });
   EXPECT_NEAR(found.slope.value, 3, 4 * found.slope.std_error);
   EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
 }
@@ -63,8 +62,7 @@ TEST(FindNoise, TellsOutliersFromHeavyTails) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal(0, kSigma);
   int drawn = 0;
-  const inference::NoiseFindings found =
-      FindIn([&](double) { return ++drawn % 150 == 0 ? 0.2 : normal(random); });
+  const NoiseFindings found = FindIn([&](double) { return ++drawn % 150 == 0 ? 0.2 : normal(random); });
   EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
   EXPECT_EQ(found.outliers.size(), 960u * 3 / 150);
 }
@@ -74,7 +72,7 @@ TEST(FindNoise, FindsTheTicksOfAPollingLoop) {
   for (double& time_s : set.observations.time_s) time_s = std::ceil(time_s / 0.0125) * 0.0125;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const inference::NoiseFindings found = inference::FindNoise(
+  const NoiseFindings found = FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_NEAR(found.poll_interval_s.value, 0.0125, 1e-8);
 }
@@ -84,7 +82,7 @@ TEST(FindNoise, CountsContactsThatAreMissed) {
   for (size_t e = 0; e < set.observations.time_s.size(); e += 11) set.observations.time_s[e] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const inference::NoiseFindings found = inference::FindNoise(
+  const NoiseFindings found = FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_NEAR(found.missed_probability.value, 1.0 / 11, 0.01);
 }
@@ -96,14 +94,14 @@ TEST(FindNoise, AFingerThatIsSilentInEveryRepeatIsOutOfReachAndNoChance) {
     if (o.pose[k] % 10 == 0) set.observations.time_s[static_cast<size_t>(k) * o.fingers + 2] = NAN;
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const inference::NoiseFindings found = inference::FindNoise(
+  const NoiseFindings found = FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_EQ(found.missed_probability.gain_nats, 0) << found.missed_probability.value;
 }
 
 // Noise drawn by touch and finger, at 10 mm/s in every other round and at 20 mm/s in the rest.
 template <typename Draw>
-inference::NoiseFindings FindAtTwoSpeeds(Draw draw, const inference::DeclaredNoise& declared = {}) {
+NoiseFindings FindAtTwoSpeeds(Draw draw, const DeclaredNoise& declared = {}) {
   SyntheticSet set(5, 48, 4, 0, 3);
   auto with_speeds = std::make_shared<session::MeasurementSet>(*set.observations.set);
   for (int k = 0; k < set.observations.size(); ++k)
@@ -113,7 +111,7 @@ inference::NoiseFindings FindAtTwoSpeeds(Draw draw, const inference::DeclaredNoi
   for (size_t e = 0; e < tangents.size(); ++e)
     set.observations.time_s[e] += draw(with_speeds->speed_m_s[e / 3], static_cast<int>(e % 3));
   set.Finish();
-  return inference::FindNoise(
+  return FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0,
       declared);
 }
@@ -121,7 +119,7 @@ inference::NoiseFindings FindAtTwoSpeeds(Draw draw, const inference::DeclaredNoi
 TEST(FindNoise, ANoiseOfLengthsAtTwoSpeedsIsNoHeavyTail) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal(0, 0.1e-3);
-  const inference::NoiseFindings found =
+  const NoiseFindings found =
       FindAtTwoSpeeds([&](double speed_m_s, int) { return normal(random) / speed_m_s; });
   EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
   EXPECT_GT(found.length_sigma_m.gain_nats, 0);
@@ -132,7 +130,7 @@ TEST(FindNoise, ANoiseOfLengthsAtTwoSpeedsIsNoHeavyTail) {
 TEST(FindNoise, TellsANoiseOfLengthsFromOneOfTimesBesideIt) {
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal(0, 1);
-  const inference::NoiseFindings found = FindAtTwoSpeeds(
+  const NoiseFindings found = FindAtTwoSpeeds(
       [&](double speed_m_s, int) { return 0.08e-3 * normal(random) / speed_m_s + 0.004 * normal(random); });
   EXPECT_NEAR(found.length_sigma_m.value, 0.08e-3, 4 * found.length_sigma_m.std_error);
   EXPECT_LT(found.length_sigma_m.std_error, 0.01e-3);
@@ -144,13 +142,13 @@ TEST(FindNoise, TellsANoiseOfLengthsFromOneOfTimesBesideIt) {
 TEST(FindNoise, OneLoudFingerIsNoHeavyTail) {
   std::mt19937_64 random(9);
   std::normal_distribution<double> normal(0, kSigma);
-  const inference::NoiseFindings found =
+  const NoiseFindings found =
       FindAtTwoSpeeds([&](double, int finger) { return (finger == 2 ? 2 : 1) * normal(random); });
   EXPECT_EQ(found.degrees_of_freedom.gain_nats, 0);
   EXPECT_EQ(found.length_sigma_m.gain_nats, 0);
   ASSERT_EQ(found.channel_sigma_s.size(), 3u);
   EXPECT_NEAR(found.sigma_s.value, kSigma, 4 * found.sigma_s.std_error);
-  const inference::NoiseEstimate& loud = found.channel_sigma_s[2];
+  const NoiseEstimate& loud = found.channel_sigma_s[2];
   EXPECT_NEAR(loud.value, std::sqrt(3) * kSigma, 4 * loud.std_error);
   EXPECT_LT(loud.std_error, 0.1 * kSigma);
   // The others are alike.
@@ -163,8 +161,7 @@ TEST(FindNoise, HeavyTailsAreNoLoudFinger) {
   for (const uint64_t seed : {10, 11, 12}) {
     std::mt19937_64 random(seed);
     std::student_t_distribution<double> student(2.5);
-    const inference::NoiseFindings found =
-        FindAtTwoSpeeds([&](double, int) { return kSigma * student(random); });
+    const NoiseFindings found = FindAtTwoSpeeds([&](double, int) { return kSigma * student(random); });
     EXPECT_GT(found.degrees_of_freedom.gain_nats, 0);
     EXPECT_TRUE(found.channel_sigma_s.empty());
     EXPECT_EQ(found.length_sigma_m.gain_nats, 0);
@@ -172,14 +169,14 @@ TEST(FindNoise, HeavyTailsAreNoLoudFinger) {
 }
 
 // Gaussian noise, under a model that says more of it.
-inference::NoiseFindings FindInPlainNoise(const inference::DeclaredNoise& declared) {
+NoiseFindings FindInPlainNoise(const DeclaredNoise& declared) {
   std::mt19937_64 random(13);
   std::normal_distribution<double> normal(0, kSigma);
   return FindAtTwoSpeeds([&](double, int) { return normal(random); }, declared);
 }
 
 TEST(FindNoise, SaysThatDeclaredKindsAreNotThere) {
-  inference::DeclaredNoise declared;
+  DeclaredNoise declared;
   declared.sigma_s = kSigma;
   declared.slope = 3;
   declared.degrees_of_freedom = 8;
@@ -187,7 +184,7 @@ TEST(FindNoise, SaysThatDeclaredKindsAreNotThere) {
   declared.missed_probability = 0.01;
   declared.length_sigma_m = 0.05e-3;
   declared.channel_sigma_s = {0, 0, kSigma};
-  const inference::NoiseFindings found = FindInPlainNoise(declared);
+  const NoiseFindings found = FindInPlainNoise(declared);
   EXPECT_TRUE(found.degrees_of_freedom.absent);
   EXPECT_TRUE(found.poll_interval_s.absent);
   EXPECT_TRUE(found.missed_probability.absent);
@@ -208,26 +205,26 @@ TEST(FindNoise, ASlopeThatIsNotThereIsAbsent) {
     set.observations.time_s[e] += normal(random);
   }
   set.Finish();
-  inference::DeclaredNoise declared;
+  DeclaredNoise declared;
   declared.slope = 1;
-  EXPECT_TRUE(inference::FindNoise(MakeNoiseSample(set.observations, set.residuals, tangents,
-                                                   std::vector<char>(tangents.size(), 1)),
-                                   0, declared)
+  EXPECT_TRUE(FindNoise(MakeNoiseSample(set.observations, set.residuals, tangents,
+                                        std::vector<char>(tangents.size(), 1)),
+                        0, declared)
                   .slope.absent);
 }
 
 TEST(FindNoise, KeepsDeclaredKindsThatAreThere) {
   std::mt19937_64 random(15);
   std::student_t_distribution<double> student(8);
-  inference::DeclaredNoise declared;
+  DeclaredNoise declared;
   declared.degrees_of_freedom = 8;
-  const inference::NoiseFindings found =
+  const NoiseFindings found =
       FindAtTwoSpeeds([&](double, int) { return kSigma * student(random); }, declared);
   EXPECT_FALSE(found.degrees_of_freedom.absent);
 }
 
 TEST(FindNoise, CannotSayThatTicksFinerThanTheFileAreNotThere) {
-  inference::DeclaredNoise declared;
+  DeclaredNoise declared;
   declared.poll_interval_s = 2e-6;
   EXPECT_FALSE(FindInPlainNoise(declared).poll_interval_s.absent);
 }
@@ -244,7 +241,7 @@ TEST(FindNoise, TheErrorOfSigmaIsThatOfTheReadingsItComesFrom) {
     for (double& time_s : set.observations.time_s) time_s += normal(random);
     set.Finish();
     const std::vector<double> tangents(set.residuals.size(), 0.1);
-    const inference::NoiseFindings found = inference::FindNoise(
+    const NoiseFindings found = FindNoise(
         MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
     squares += std::pow((found.sigma_s.value - kSigma) / found.sigma_s.std_error, 2);
   }
@@ -262,7 +259,7 @@ TEST(FindNoise, FrequentSilenceIsNotTakenForReach) {
         if (std::uniform_real_distribution<double>()(random) < probability) time_s = NAN;
       set.Finish();
       const std::vector<double> tangents(set.residuals.size(), 0.1);
-      const inference::NoiseFindings found = inference::FindNoise(
+      const NoiseFindings found = FindNoise(
           MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)),
           0);
       sum += found.missed_probability.value;
@@ -282,7 +279,7 @@ TEST(FindNoise, SilenceIsCountedBesideFingersOutOfReach) {
   }
   set.Finish();
   const std::vector<double> tangents(set.residuals.size(), 0.1);
-  const inference::NoiseFindings found = inference::FindNoise(
+  const NoiseFindings found = FindNoise(
       MakeNoiseSample(set.observations, set.residuals, tangents, std::vector<char>(tangents.size(), 1)), 0);
   EXPECT_NEAR(found.missed_probability.value, 0.4, 0.04);
 }

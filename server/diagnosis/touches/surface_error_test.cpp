@@ -1,4 +1,4 @@
-#include "server/diagnosis/inference/likelihood.h"
+#include "server/diagnosis/engine/likelihood.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -26,8 +26,8 @@ class SurfaceErrorTest : public ::testing::Test {
     observations = std::make_unique<Observations>(*MakeObservations(input));
     details = *Predict(*observations, *input.model, true, false, nullptr);
     contrasts = std::make_unique<Contrasts>(*observations, details.time_s);
-    const inference::SmoothErrorGeometry geometry = SurfaceErrorGeometry(*observations, *contrasts, details);
-    likelihood = std::make_unique<inference::Likelihood>(
+    const engine::SmoothErrorGeometry geometry = SurfaceErrorGeometry(*observations, *contrasts, details);
+    likelihood = std::make_unique<engine::Likelihood>(
         FirstRowsOfObjects(*contrasts, static_cast<int>(observations->objects.size())), &geometry, 0,
         nullptr);
   }
@@ -41,12 +41,12 @@ class SurfaceErrorTest : public ::testing::Test {
   std::unique_ptr<Observations> observations;
   Prediction details;
   std::unique_ptr<Contrasts> contrasts;
-  std::unique_ptr<inference::Likelihood> likelihood;
+  std::unique_ptr<engine::Likelihood> likelihood;
 };
 
 // The covariance of contrasts under a hypothesis, element by element from its definition.
 Eigen::MatrixXd DenseCovariance(const SurfaceErrorTest&, const Observations& o, const Contrasts& c,
-                                const Prediction& d, const inference::SurfaceErrorHypothesis& surface) {
+                                const Prediction& d, const engine::SurfaceErrorHypothesis& surface) {
   const int entries = static_cast<int>(o.time_s.size());
   Eigen::MatrixXd field = Eigen::MatrixXd::Zero(entries, entries);
   for (int a = 0; a < entries; ++a)
@@ -68,7 +68,7 @@ Eigen::MatrixXd DenseCovariance(const SurfaceErrorTest&, const Observations& o, 
 
 TEST_F(SurfaceErrorTest, IsTheGaussianWithTheFieldsCovariance) {
   for (const int s : {0, 5, 20, 40, 65}) {
-    const inference::SurfaceErrorHypothesis& surface = likelihood->hypotheses()[s];
+    const engine::SurfaceErrorHypothesis& surface = likelihood->hypotheses()[s];
     Eigen::MatrixXd v = Eigen::MatrixXd::Identity(likelihood->rows(), likelihood->rows());
     if (s > 0) v = DenseCovariance(*this, *observations, *contrasts, details, surface);
     const Eigen::VectorXd r = Noise(s);
@@ -119,12 +119,12 @@ TEST_F(SurfaceErrorTest, PredictsRowsLeftOutFromTheOthersOnly) {
 TEST_F(SurfaceErrorTest, GramsOfPickedColumnsAreBlocksOfTheWhole) {
   Eigen::MatrixXd values(likelihood->rows(), 4);
   for (int c = 0; c < 4; ++c) values.col(c) = Noise(10 + c);
-  const inference::Likelihood::Columns all = likelihood->Prepare(values);
+  const engine::Likelihood::Columns all = likelihood->Prepare(values);
   const Eigen::MatrixXd whole = likelihood->Gram(all, 30);
-  const Eigen::MatrixXd part = likelihood->Gram(inference::Likelihood::Pick(all, {3, 1}), 30);
+  const Eigen::MatrixXd part = likelihood->Gram(engine::Likelihood::Pick(all, {3, 1}), 30);
   EXPECT_NEAR(part(0, 1), whole(3, 1), 1e-9);
-  const inference::Likelihood::Columns joined = inference::Likelihood::Join(
-      inference::Likelihood::Pick(all, {0, 1}), likelihood->Prepare(values.rightCols(2)));
+  const engine::Likelihood::Columns joined = engine::Likelihood::Join(
+      engine::Likelihood::Pick(all, {0, 1}), likelihood->Prepare(values.rightCols(2)));
   EXPECT_LT((likelihood->Gram(joined, 30) - whole).norm(), 1e-9);
   EXPECT_NEAR(likelihood->Norms(all, 30)[2], whole(2, 2), 1e-9);
 }
@@ -137,7 +137,7 @@ TEST_F(SurfaceErrorTest, TheFieldFollowsBumpsAndNotNoise) {
               std::exp(-(details.contact_m[e] - details.contact_m[1]).squaredNorm() / (2 * 0.02 * 0.02)) *
               details.inverse_speed_s_per_m[e] / details.cos_incidence[e];
   const Eigen::VectorXd r = contrasts->Apply(bump);
-  const inference::Likelihood::Columns columns = likelihood->Prepare(r);
+  const engine::Likelihood::Columns columns = likelihood->Prepare(r);
   double best = 0;
   for (int s = 1; s < static_cast<int>(likelihood->hypotheses().size()); ++s)
     best = std::max(best, 1 - (r - likelihood->FieldMean(columns, s)).squaredNorm() / r.squaredNorm());

@@ -62,9 +62,9 @@ std::vector<int> FirstRowsOfObjects(const Contrasts& contrasts, int objects) {
   return rows;
 }
 
-inference::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts& contrasts,
-                                                    const Prediction& details) {
-  inference::SmoothErrorGeometry geometry;
+engine::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Contrasts& contrasts,
+                                                 const Prediction& details) {
+  engine::SmoothErrorGeometry geometry;
   const int objects = static_cast<int>(o.objects.size());
   geometry.sites.resize(objects);
   geometry.distinct_m.resize(objects);
@@ -79,7 +79,7 @@ inference::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const
       geometry.mean_row_per_m += details.inverse_speed_s_per_m[entry];
       ++counted;
       if (!seen[o.pose[k]]) geometry.distinct_m[o.object[k]].push_back(details.contact_m[entry]);
-      inference::SmoothErrorSite site;
+      engine::SmoothErrorSite site;
       site.position_m = details.contact_m[entry];
       site.first_row = contrasts.FirstRow(touch);
       const double time_per_m =

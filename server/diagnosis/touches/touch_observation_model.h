@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/inference/observation_model.h"
-#include "server/diagnosis/inference/smooth_error.h"
+#include "server/diagnosis/engine/observation_model.h"
+#include "server/diagnosis/engine/smooth_error.h"
 #include "server/diagnosis/touches/contrasts.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/diagnosis/touches/predictor.h"
 
 namespace touchstone::diagnosis::touches {
 
-class TouchObservationModel : public inference::ObservationModel {
+class TouchObservationModel : public engine::ObservationModel {
  public:
   // All must outlive it. `nominal_s`: the given model's times, which stand in where another model misses.
   TouchObservationModel(const Observations& observations, const Predictor& predictor,
@@ -53,7 +53,7 @@ std::vector<int> FirstRowsOfObjects(const Contrasts& contrasts, int objects);
 
 // How bumps of the objects' surfaces change the contrasts: a bump h along the normal shortens the travel by
 // h / cos(incidence). `details`: of the nominal model, which says where the contacts are.
-inference::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& observations,
-                                                    const Contrasts& contrasts, const Prediction& details);
+engine::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& observations, const Contrasts& contrasts,
+                                                 const Prediction& details);
 
 }  // namespace touchstone::diagnosis::touches

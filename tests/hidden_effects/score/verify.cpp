@@ -18,7 +18,7 @@ absl::StatusOr<double> FinalRmseFoundAgainUs(const Set& set, const v1::Report& r
                               InputFor(set.csv, saved.empty() ? set.model_yaml : saved, objects));
   TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis compared, diagnosis::Compare(input, {}));
   if (!compared.final) return absl::NotFoundError("no touch could be compared");
-  return compared.final->rmse_s * kMicrosecondsPerSecond;
+  return compared.final->rmse * kMicrosecondsPerSecond;
 }
 
 std::string WithEffect(const std::string& model_yaml, const std::string& effect_yaml) {

@@ -1,0 +1,123 @@
+#include "server/diagnosis/engine/findings.h"
+
+#include "server/base/status.h"
+#include "server/diagnosis/engine/candidate_ranking.h"
+
+namespace touchstone::diagnosis::engine {
+namespace {
+
+constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
+constexpr double kUnexplainedShare = 0.01;  // of the noise that such a rest must add
+
+class Finder {
+ public:
+  Finder(const Modality& modality, double noise)
+      : modality_(modality),
+        noise_(noise),
+        experiment_(modality.experiment()),
+        search_(experiment_, modality.candidates(), SearchRules(), [](const std::string&) {}),
+        whole_{modality.alone(), static_cast<int>(modality.given().effects.size())} {}
+
+  absl::StatusOr<Findings> Run() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(found_.initial, modality_.Compare(modality_.given()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const FinalRows rows, modality_.RowsNear(whole_.fit));
+    values_ = whole_.fit;
+    if (rows.owner != nullptr) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(values_, FitModel(rows.experiment, whole_.fit.model));
+    }
+    const Eigen::MatrixXd covariance = modality_.CovarianceOf(rows.experiment, values_);
+    found_.improved = values_.model.base();
+    RoundValues(values_, &found_.improved);
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven(covariance));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps(covariance));
+    TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
+    TOUCHSTONE_RETURN_IF_ERROR(Rank());
+    Judge();
+    return std::move(found_);
+  }
+
+ private:
+  absl::StatusOr<Quality> QualityOf(const model::Model& model, const Fit& searched, const Fit& final) const {
+    TOUCHSTONE_ASSIGN_OR_RETURN(Quality quality, modality_.Compare(model));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const HeldOutError heldout, modality_.HeldOut(searched, final));
+    quality.heldout_rmse = heldout.Of(quality.rmse);
+    return quality;
+  }
+
+  absl::Status DescribeGiven(const Eigen::MatrixXd& covariance) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(GivenEffects given,
+                                DescribeGivenEffects(experiment_, whole_.fit, values_, covariance,
+                                                     modality_.given(), modality_.objects()));
+    for (const int index : given.superfluous)
+      found_.improved.effects.erase(found_.improved.effects.begin() + index);
+    values_wrong_ = given.changed();
+    found_.superfluous = std::move(given.superfluous_names);
+    found_.refitted = std::move(given.refitted);
+    return absl::OkStatus();
+  }
+
+  absl::Status DescribeSteps(const Eigen::MatrixXd& covariance) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<SelectedStep> selected,
+                                FindCompetitors(search_, whole_, -1, {}));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<OrderedStep> ordered,
+                                OrderSteps(experiment_, whole_, -1, selected));
+    for (const OrderedStep& next : ordered) {
+      LadderStep step = DescribeStep(values_, covariance, *next.step);
+      AddConfounded(step, &found_.confounded);
+      const Fit& final = next.whole ? values_ : next.fit;
+      step.model = next.whole ? found_.improved : final.model.base();
+      TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOf(step.model, next.fit, final));
+      found_.steps.push_back(std::move(step));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Rank() {
+    const Parameterization given(modality_.given(), modality_.objects());
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Fit initial, FitModel(experiment_, given));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        found_.candidates, RankCandidates(search_, initial, whole_.initial_effects,
+                                          [this](const Fit& fit, RankedCandidate* candidate) -> absl::Status {
+                                            TOUCHSTONE_ASSIGN_OR_RETURN(
+                                                const Quality quality, QualityOf(fit.model.base(), fit, fit));
+                                            candidate->rmse = quality.rmse;
+                                            candidate->heldout_rmse = quality.heldout_rmse;
+                                            return absl::OkStatus();
+                                          }));
+    return absl::OkStatus();
+  }
+
+  void Judge() {
+    const bool rest = StructureRemains(found_.final, noise_);
+    found_.changed = values_wrong_ || !found_.steps.empty();
+    found_.verdict = rest                    ? Verdict::kUnexplained
+                     : !found_.steps.empty() ? Verdict::kMissingEffects
+                     : values_wrong_         ? Verdict::kWrongValues
+                                             : Verdict::kAdequate;
+    if (rest)
+      DoubtBesideRest(MostBesideRest(ExplainedShare(found_.initial.rmse, found_.final.rmse, noise_), false),
+                      &found_.steps, &found_.candidates);
+    if (found_.changed && !found_.improved.name.empty()) found_.improved.name += "_better";
+  }
+
+  const Modality& modality_;
+  const double noise_;
+  const Experiment& experiment_;
+  const StepwiseSearch search_;
+  const Explanation whole_;
+  Fit values_;
+  bool values_wrong_ = false;
+  Findings found_;
+};
+
+}  // namespace
+
+absl::StatusOr<Findings> FindMissing(const Modality& modality, double noise) {
+  return Finder(modality, noise).Run();
+}
+
+bool StructureRemains(const Quality& quality, double noise) {
+  return quality.lack_of_fit_p < kUnexplainedP && quality.rmse > (1 + kUnexplainedShare) * noise;
+}
+
+}  // namespace touchstone::diagnosis::engine

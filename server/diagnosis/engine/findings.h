@@ -1,0 +1,34 @@
+// What one kind of measurement by itself is found to lack, from its rows alone: the whole way from an explanation to a
+// verdict. Kinds with hypotheses, noise or words of their own build on its parts (ladder.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/modality.h"
+
+namespace touchstone::diagnosis::engine {
+
+struct Findings {
+  Verdict verdict = Verdict::kNone;
+  Quality initial, final;                // of the given and of the improved model
+  std::vector<RefittedEffect> refitted;  // values of the given model's effects that must change
+  std::vector<std::string> superfluous;  // its effects that the data do without
+  std::vector<LadderStep> steps;         // in the order in which they explain most
+  std::vector<ConfoundedEffects> confounded;
+  std::vector<RankedCandidate> candidates;  // best first
+  model::Model improved;                    // the given model with steps and refits
+  bool changed = false;                     // improved differs from the given model
+};
+
+// `noise`: standard deviation of the modality's errors, in its unit, that no model can go below. Errors as FitModel and as
+// the modality's.
+absl::StatusOr<Findings> FindMissing(const Modality& modality, double noise);
+
+// Whether a misfit is left that the noise does not bring about.
+bool StructureRemains(const Quality& quality, double noise);
+
+}  // namespace touchstone::diagnosis::engine

@@ -1,0 +1,24 @@
+#include "server/diagnosis/engine/modality.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/engine/held_out.h"
+
+namespace touchstone::diagnosis::engine {
+
+double HeldOutError::Of(double rmse) const {
+  return std::sqrt(ratio * ratio * rmse * rmse + excess_squares);
+}
+
+absl::StatusOr<HeldOutError> Modality::HeldOut(const Fit& /*searched*/, const Fit& final) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double unseen, HeldOutRmseRefitted(experiment(), final));
+  const double seen = std::sqrt(final.columns.values.col(0).squaredNorm() /
+                                std::max<double>(1, static_cast<double>(final.columns.values.rows())));
+  HeldOutError error;
+  if (seen > 0) error.ratio = std::max(unseen / seen, 1.0);
+  return error;
+}
+
+}  // namespace touchstone::diagnosis::engine

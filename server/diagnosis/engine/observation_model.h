@@ -1,0 +1,54 @@
+// What the engine is given: rows of numbers that were measured, and a simulator that predicts them. A room of
+// observations (touches/, later images/) implements this; see server/README.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <Eigen/Core>
+
+#include "server/model/model.h"
+
+namespace touchstone::diagnosis::engine {
+
+// Rows are differences that noise leaves independent, of equal variance. Rows of one group (an object) follow
+// each other; a group's smooth error and its own values concern its rows only. Methods are const and may be
+// called from several threads at once.
+class ObservationModel {
+ public:
+  virtual ~ObservationModel() = default;
+
+  virtual int rows() const = 0;
+  virtual const std::vector<std::string>& groups() const = 0;  // names, as in the model's per-object values
+  virtual int FirstRowOfGroup(int group) const = 0;            // group = count: rows()
+  virtual int GroupOfRow(int row) const = 0;
+  // Rows of one block share their errors (repeats of one pose): they are left out of a fit together.
+  virtual int BlockOfRow(int row) const = 0;
+  // When the row was measured, in any unit that grows with time: what a stretch of time is, that is left out together.
+  virtual double TimeOfRow(int row) const = 0;
+
+  // What the deterministic part of a model expects, one number per reading; NaN where it expects none. Only the
+  // methods below read it.
+  virtual absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const = 0;
+  // Measured minus predicted, as rows.
+  virtual Eigen::VectorXd Residual(const std::vector<double>& predicted) const = 0;
+  // `moved` minus `predicted`, as rows, for a derivative: readings that jump between the two (another face is
+  // met) count as unchanged.
+  virtual Eigen::VectorXd Change(const std::vector<double>& predicted,
+                                 const std::vector<double>& moved) const = 0;
+
+  // For derivatives: what `moved` expects, near `at`, of which `predicted` is known. Simulations that are dear answer
+  // by what they have seen nearby. Called from tasks of a thread pool.
+  virtual absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model&,
+                                                          const std::vector<double>&) const {
+    return Predict(moved);
+  }
+  // How far a value moves for a derivative, over its parameter's scale.
+  virtual double DerivativeStep() const { return 0.02; }
+  // Whether derivatives by this effect hold only near where the rows were made, and are known roughly even there: what is
+  // known to act nearly alike is then told from it by a clear share of what it explains only.
+  virtual bool HasRoughDerivatives(const model::Effect&) const { return false; }
+};
+
+}  // namespace touchstone::diagnosis::engine

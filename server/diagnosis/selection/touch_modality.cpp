@@ -1,0 +1,48 @@
+#include "server/diagnosis/selection/touch_modality.h"
+
+#include "server/base/status.h"
+#include "server/diagnosis/selection/quality.h"
+
+namespace touchstone::diagnosis::selection {
+
+model::Model TouchPartOf(const model::Model& model) {
+  model::Model part = model;
+  part.effects.clear();
+  for (const model::EffectInstance& instance : model.effects)
+    if (!instance.effect->of_photos()) part.effects.push_back(instance);
+  return part;
+}
+
+absl::StatusOr<std::unique_ptr<TouchModality>> TouchModality::Make(const DiagnosisInput& input,
+                                                                   const DiagnosisContext& context) {
+  DiagnosisInput touches = input;
+  touches.images = nullptr;
+  touches.model = std::make_shared<const model::Model>(TouchPartOf(*input.model));
+  std::unique_ptr<TouchModality> made(new TouchModality());
+  made->context_ = context;
+  TOUCHSTONE_ASSIGN_OR_RETURN(made->workspace_, MakeWorkspace(touches, context));
+  if (context.progress) {
+    made->workspace_->experiment.cancelled = [progress = context.progress] {
+      return !progress("fitting the touches", 0);
+    };
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(made->found_, SelectExplanation(made->workspace_.get()));
+  return made;
+}
+
+absl::StatusOr<engine::Quality> TouchModality::Compare(const model::Model& model) const {
+  return CompareTouches(workspace_->input, model, context_);
+}
+
+absl::StatusOr<engine::Quality> CompareTouches(DiagnosisInput input, const model::Model& model,
+                                               const DiagnosisContext& context) {
+  input.images = nullptr;
+  input.model = std::make_shared<const model::Model>(TouchPartOf(model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, context));
+  const touches::Observations& o = *workspace->observations;
+  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
+  const double rmse = touches::Rmse(o, residuals);
+  return engine::Quality{rmse, rmse, LackOfFitP(o, residuals, 0)};
+}
+
+}  // namespace touchstone::diagnosis::selection
