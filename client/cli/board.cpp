@@ -4,11 +4,13 @@
 
 #include "client/cli/model_output.h"
 #include "client/report/report.h"
+#include "client/report/words.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/boards/board_pictures.h"
-#include "server/diagnosis/report/board_messages.h"
+#include "server/diagnosis/report/from_boards.h"
+#include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -59,19 +61,21 @@ std::string VerdictWords(const v1::Report& report) {
 
 // The reprojection error after each step.
 std::string LadderInWords(const v1::Report& report) {
-  if (!report.has_initial()) return "";
+  const v1::DataReport& data = client::MainData(report);
+  if (!data.has_initial()) return "";
   std::string words = absl::StrFormat("\n%-22s %12s %12s %12s\n", "Reprojection error", "fitted px",
                                       "left-out px", "lack of fit");
-  const auto add = [&](const std::string& name, const auto& quality) {
-    absl::StrAppendFormat(&words, "%-22s %12.4f %12.4f   p = %.2g\n", name, quality.rmse_px(),
-                          quality.heldout_rmse_px(), quality.lack_of_fit_p());
+  const auto add = [&](const std::string& name, const v1::Quality& quality) {
+    absl::StrAppendFormat(&words, "%-22s %12.4f %12.4f   p = %.2g\n", name, quality.rmse(),
+                          quality.heldout_rmse(), quality.lack_of_fit_p());
   };
-  add("nominal lens", report.initial());
-  for (const v1::Step& step : report.steps()) add(absl::StrCat("+ ", step.effect()), step);
-  if (report.noise_floor().sigma_px() > 0)
+  add("nominal lens", data.initial());
+  for (int i = 0; i < data.after_step_size(); ++i)
+    add(absl::StrCat("+ ", report.steps(i).effect()), data.after_step(i));
+  if (data.noise_floor() > 0)
     absl::StrAppendFormat(&words,
                           "Noise of a corner: %.4f px a coordinate, at most (from residuals, no repeats)\n",
-                          report.noise_floor().sigma_px());
+                          data.noise_floor());
   return words;
 }
 
@@ -118,15 +122,14 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardSet set, boards::ReadBoardPictures(options.set, layout));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardDiagnosis diagnosis,
                               boards::DiagnoseBoards(set, model, options.seed));
-  v1::Report report = diagnosis::report::WriteBoardReport(set, diagnosis);
+  v1::Report report = diagnosis::report::ToReport(diagnosis::report::FromBoards(diagnosis, set));
   AddClientProvenance(cli.command_line(), "", {}, &report);
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (!options.ReportOnStdout()) TOUCHSTONE_RETURN_IF_ERROR(cli.Print(BoardReportInWords(report)));
   if (save_model.empty()) return absl::OkStatus();
   model::Model improved = model;
-  if (!diagnosis.improved_model_yaml.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(improved, model::ParseModel(diagnosis.improved_model_yaml,
-                                                            "the improved model", effects::Catalogue()));
+  if (diagnosis.improved_model) {
+    improved = *diagnosis.improved_model;
     improved.name = std::filesystem::path(save_model).stem().string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", save_model, improved));

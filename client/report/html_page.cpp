@@ -136,8 +136,8 @@ std::string Bar(double share, absl::string_view css_class, double mark) {
   return svg + "</svg>";
 }
 
-std::string FingerName(const v1::Report& report, int finger) {
-  return finger < report.fingers_size() ? report.fingers(finger) : absl::StrCat(finger);
+std::string FingerName(const v1::DataReport& data, int finger) {
+  return finger < data.fingers_size() ? data.fingers(finger) : absl::StrCat(finger);
 }
 
 std::string Legend(const std::vector<std::pair<std::string, std::string>>& keys) {

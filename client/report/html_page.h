@@ -36,8 +36,8 @@ std::string HeaderRow(const std::vector<std::string>& titles);
 // none).
 std::string Bar(double share, absl::string_view css_class, double mark = -1);
 
-// The finger's name, or its number if the report has no names.
-std::string FingerName(const v1::Report& report, int finger);
+// The finger's name, or its number if the entry has no names.
+std::string FingerName(const v1::DataReport& data, int finger);
 
 // A line of keys for charts: pairs of css class and plain text.
 std::string Legend(const std::vector<std::pair<std::string, std::string>>& keys);
@@ -57,7 +57,7 @@ std::string HtmlPhotographMethods(const v1::Report& report);
 std::string HtmlObjects(const v1::Report& report);  // residuals on the surface
 std::string HtmlFit(const v1::Report& report);      // parity and histograms
 std::string HtmlDistributions(const v1::Report& report);
-std::string HtmlNextTouches(const v1::Report& report);
+std::string HtmlNextTouches(const v1::Report& report);  // what to measure next
 std::string HtmlData(const v1::Report& report);
 std::string HtmlProvenance(const v1::Report& report);
 std::string HtmlMethods(const v1::Report& report);  // how the numbers were computed

@@ -49,7 +49,7 @@ std::string HtmlProvenance(const v1::Report& report) {
   add("Seed", absl::StrCat(provenance.seed()));
   add("Set", provenance.set_sha256().empty()
                  ? ""
-                 : absl::StrCat(Escape(report.data().origin()), ", SHA-256 ", Hash(provenance.set_sha256())));
+                 : absl::StrCat(Escape(MainData(report).session()), ", SHA-256 ", Hash(provenance.set_sha256())));
   add("Model", report.model_hash().empty()
                    ? ""
                    : absl::StrCat(Escape(report.model_name()), ", hash ", Hash(report.model_hash())));

@@ -4,12 +4,16 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/selection/result.h"
 #include "server/session/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 
+using selection::ProblemKind;
+
 struct Mistake {
-  std::string kind, detail;  // of v1::DataProblem
+  ProblemKind kind = ProblemKind::kFingerOrder;
+  std::string detail;        // as of DataProblem
   std::string words;         // "columns l and m of the times are exchanged", to follow "It looks as if"
   session::MeasurementFix fix;
   std::vector<std::string> objects;  // that it concerns, by their names in the file; empty: all

@@ -40,8 +40,6 @@ struct PhotographStep {
   double gain_nats = 0;
   std::vector<inference::ParameterEstimate> parameters;
   GreyQuality quality;
-  std::optional<selection::Quality> touch_quality;  // of a joint diagnosis
-  std::string shown_by;  // of a joint diagnosis: "touches", "photographs" or "both"
   model::Model model;
   std::string meaning, check_on_rig, remedy, words;
 };
@@ -105,8 +103,8 @@ struct UnexplainedPhotographs {
 };
 
 struct PhotographDataProblem {
-  // channel_order, mirrored, rotated, units_angle, up_axis, wrong_object, object_names, focal_factor, units_length, row_shift
-  std::string kind, detail, words, fix;
+  selection::ProblemKind kind = selection::ProblemKind::kChannelOrder;
+  std::string detail, words, fix;
   double rmse_before_grey = 0, rmse_after_grey = 0;
 };
 
@@ -127,7 +125,7 @@ struct PhotographDiagnosis {
   std::vector<PhotographDataProblem> data_problems;
   std::optional<UnexplainedPhotographs> unexplained;
   int images_needed = 0;  // with kTooLittleData
-  std::string improved_model_yaml, improved_model_hash;
+  std::optional<model::Model> improved_model;  // none: nothing changed
   std::vector<ProposedPhotograph> next_photographs;
 
   // Where.

@@ -1,5 +1,7 @@
 #include "server/diagnosis/report/message_parts.h"
 
+#include <algorithm>
+
 namespace touchstone::diagnosis::report {
 
 v1::Report::Verdict ToMessage(selection::Verdict verdict) {
@@ -22,24 +24,43 @@ v1::Report::Verdict ToMessage(selection::Verdict verdict) {
   return v1::Report::VERDICT_UNSPECIFIED;
 }
 
-const char* ToMessage(selection::EffectScope scope) {
-  return scope == selection::EffectScope::kObject ? "object" : "rig";
+v1::DataReport::Kind ToMessage(DataKind kind) {
+  static_assert(static_cast<int>(DataKind::kDistributions) + 1 == v1::DataReport::DISTRIBUTIONS);
+  return static_cast<v1::DataReport::Kind>(static_cast<int>(kind) + 1);
 }
 
-const char* ToMessage(selection::CandidateNote note) {
-  switch (note) {
-    case selection::CandidateNote::kNone:
-      return "";
-    case selection::CandidateNote::kInvisible:
-      return "this experiment cannot see it";
-    case selection::CandidateNote::kNeutral:
-      return "fits best where it changes nothing";
-    case selection::CandidateNote::kAtBound:
-      return "its best value lies at its bound";
-    case selection::CandidateNote::kLinearised:
-      return "not among the eight most probable; its gain is a linearised prediction";
+v1::Scope ScopeMessage(selection::EffectScope scope,
+                       const std::vector<inference::ParameterEstimate>& parameters) {
+  v1::Scope message;
+  message.set_kind(scope == selection::EffectScope::kObject ? v1::Scope::OBJECT : v1::Scope::RIG);
+  for (const inference::ParameterEstimate& estimate : parameters)
+    if (!estimate.object.empty() && std::count(message.objects().begin(), message.objects().end(),
+                                               estimate.object) == 0)
+      message.add_objects(estimate.object);
+  return message;
+}
+
+void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters,
+                     google::protobuf::RepeatedPtrField<v1::ParameterValue>* messages) {
+  for (const inference::ParameterEstimate& estimate : parameters) {
+    v1::ParameterValue* value = messages->Add();
+    value->set_name(estimate.name);
+    value->set_value(estimate.value);
+    value->set_std_error(estimate.std_error);
+    value->set_unit(estimate.unit);
+    value->set_finger(estimate.entry);
+    value->set_object(estimate.object);
+    value->set_lower(estimate.lower);
+    value->set_upper(estimate.upper);
+    if (estimate.before) value->set_before(*estimate.before);
+    for (const auto& [kind, error] : {std::pair{v1::DataReport::TOUCHES, estimate.std_error_touches},
+                                      std::pair{v1::DataReport::PHOTOGRAPHS, estimate.std_error_photographs}}) {
+      if (!error) continue;
+      v1::ErrorAlone* alone = value->add_alone();
+      alone->set_kind(kind);
+      alone->set_std_error(*error);
+    }
   }
-  return "";
 }
 
 }  // namespace touchstone::diagnosis::report
