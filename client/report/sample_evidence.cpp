@@ -1,4 +1,4 @@
-#include "client/data/sample_evidence.h"
+#include "client/report/sample_evidence.h"
 
 #include <array>
 #include <cmath>

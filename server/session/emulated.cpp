@@ -8,7 +8,7 @@
 
 namespace touchstone::session {
 
-bool NamesAnEmulator(absl::string_view provenance) {
+bool NotedAsEmulated(absl::string_view provenance) {
   const std::string text = absl::AsciiStrToLower(provenance);
   return absl::StrContains(text, "emulated") || absl::StrContains(text, "emulator");
 }

@@ -150,7 +150,7 @@ TEST_F(SessionImages, BecomeAnImageSetInTheObjectsFrame) {
 TEST_F(SessionImages, OfAnEmulatedRigSaySo) {
   JournalSession session;
   session.name = "emulated";
-  session.provenance = "emulated rig: not a measurement of anything; UR3e at 127.0.0.1";
+  session.emulated = true;
   ASSERT_TRUE(journal_->EnsureSession(session).ok());
   ASSERT_TRUE(journal_->AddImage("emulated", ImageWithView("a", 0)).ok());
   const auto files = SessionImageSetFiles(*journal_, "emulated");
