@@ -92,7 +92,8 @@ TEST_F(BoardCommand, TooFewBoardsGiveNoVerdictAndNoErrors) {
   EXPECT_EQ(report["verdict"], "TOO_LITTLE_DATA");
   EXPECT_TRUE(report["steps"].empty());
   // Files have every field that others rely on, zero where nothing was found.
-  for (const char* quality : {"initial", "final"}) EXPECT_EQ(report["data"][0][quality]["rmse"], 0) << quality;
+  for (const char* quality : {"initial", "final"})
+    EXPECT_EQ(report["data"][0][quality]["rmse"], 0) << quality;
   // Inner corners, not squares.
   const Outcome none = Run({"diagnose", "two", "--board", "10x7", "--square-mm", "25"});
   EXPECT_EQ(none.exit_code, 0) << none.err;

@@ -355,7 +355,8 @@ absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes)
     v1::MeshFile::Format format;
     v1::MeshFile::LengthUnit unit;
     v1::MeshFile::Axis up;
-    TOUCHSTONE_CHECK(v1::MeshFile::Format_Parse(named(fs::path(source.path).extension().string().substr(1)), &format));
+    TOUCHSTONE_CHECK(
+        v1::MeshFile::Format_Parse(named(fs::path(source.path).extension().string().substr(1)), &format));
     TOUCHSTONE_CHECK(v1::MeshFile::LengthUnit_Parse(named(source.unit), &unit));
     TOUCHSTONE_CHECK(v1::MeshFile::Axis_Parse(named(source.up), &up));
     file->set_format(format);

@@ -83,8 +83,8 @@ absl::Status WritePlan(const Cli& cli, const ProposeOptions& options, const Plan
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (report.next().empty()) {
     cli.Log(report.data_problems().empty()
-                ? absl::StrCat("no ", kind.many, " to propose: no explanations are left that further ", kind.many,
-                               " would tell apart")
+                ? absl::StrCat("no ", kind.many, " to propose: no explanations are left that further ",
+                               kind.many, " would tell apart")
                 : absl::StrCat("no ", kind.many, " to propose before the set is fixed: ", report.summary()));
     return absl::OkStatus();
   }

@@ -49,8 +49,9 @@ class SurfaceMapCommandTest : public RealBinaryTest {
     command.insert(command.end(), more.begin(), more.end());
     const Outcome outcome = Run(command);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    return outcome.exit_code == 0 ? Json::parse(Read("compare.json"))["data"][0]["initial"]["rmse"].get<double>()
-                                  : -1;
+    return outcome.exit_code == 0
+               ? Json::parse(Read("compare.json"))["data"][0]["initial"]["rmse"].get<double>()
+               : -1;
   }
 };
 

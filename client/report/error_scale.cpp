@@ -11,7 +11,10 @@ namespace touchstone::client {
 std::string ErrorScale::Plain(double error) const {
   const double size = std::abs(error);
   if (std::isnan(error)) return "n/a";
-  return kind_ == v1::DataReport::BOARDS ? Number(error) : Fixed(error, size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
+  return kind_ == v1::DataReport::BOARDS ? Number(error)
+                                         : Fixed(error, size < 9.995   ? 2
+                                                        : size < 99.95 ? 1
+                                                                       : 0);
 }
 
 const char* ErrorScale::Symbol() const {

@@ -12,9 +12,7 @@ class ErrorScale {
   explicit ErrorScale(const v1::DataReport& data) : kind_(data.kind()) {}
 
   v1::DataReport::Kind kind() const { return kind_; }
-  bool pictures() const {
-    return kind_ == v1::DataReport::PHOTOGRAPHS || kind_ == v1::DataReport::BOARDS;
-  }
+  bool pictures() const { return kind_ == v1::DataReport::PHOTOGRAPHS || kind_ == v1::DataReport::BOARDS; }
   const char* readings() const { return pictures() ? "pictures" : "touches"; }
   const char* one_reading() const { return pictures() ? "picture" : "touch"; }
   const char* Counted(uint32_t count) const { return count == 1 ? one_reading() : readings(); }

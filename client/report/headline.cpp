@@ -101,8 +101,7 @@ std::string TooLittle(const v1::Report& report) {
   if (report.data_size() > 1) needed = "the summary says which kind needs more.";
   if (used == 0)
     return absl::StrCat("No ", scale.one_reading(), " could be used, so nothing can be said; ", needed);
-  return absl::StrCat("Too little data for a verdict: ", Count(used), " ",
-                      scale.Counted(used), "; ", needed);
+  return absl::StrCat("Too little data for a verdict: ", Count(used), " ", scale.Counted(used), "; ", needed);
 }
 
 std::string WrongValues(const v1::Report& report) {
@@ -163,9 +162,8 @@ std::string Headline(const v1::Report& report) {
       if (!FingerScatterWords(report).empty())
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
-      return absl::StrCat("Nothing is missing: ", model, " is as good as ",
-                          Count(MainData(report).count()), " ", ErrorScale(MainData(report)).readings(),
-                          " can tell.");
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(MainData(report).count()),
+                          " ", ErrorScale(MainData(report)).readings(), " can tell.");
     case v1::Report::WRONG_VALUES:
       return WrongValues(report);
     case v1::Report::MISSING_EFFECTS:

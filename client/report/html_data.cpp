@@ -23,7 +23,8 @@ std::string Floors(const v1::DataReport& data) {
   std::string text = absl::StrCat(floor.bound ? "at most " : "", scale.Text(floor.sigma));
   const v1::NoiseFloor& detail = data.noise();
   if (detail.lower() > 0 && detail.lower() < detail.upper())
-    absl::StrAppend(&text, ", 95 % interval ", scale.Text(detail.lower()), " to ", scale.Text(detail.upper()));
+    absl::StrAppend(&text, ", 95 % interval ", scale.Text(detail.lower()), " to ",
+                    scale.Text(detail.upper()));
   absl::StrAppend(&text,
                   floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same ",
                   floor.bound ? "" : scale.one_reading());
@@ -71,8 +72,7 @@ std::string WorstTouches(const v1::DataReport& data) {
   const ErrorScale scale(data);
   std::vector<std::string> titles = {">Touch", "Object", ">Size"};
   int fingers = 0;
-  for (const v1::TouchError& touch : data.worst_touches())
-    fingers = std::max(fingers, touch.residual_size());
+  for (const v1::TouchError& touch : data.worst_touches()) fingers = std::max(fingers, touch.residual_size());
   for (int i = 0; i < fingers; ++i) titles.push_back(absl::StrCat(">finger ", FingerName(data, i)));
   std::string table = absl::StrCat("<div class=\"scroll\"><table>", HeaderRow(titles), "<tbody>");
   for (const v1::TouchError& touch : data.worst_touches()) {

@@ -34,8 +34,8 @@ std::string Parity(const v1::DataReport& data, bool improved) {
     std::vector<ChartPoint> points;
     for (int i = 0; i < data.parity_size(); i += step) {
       const v1::ParityPoint& point = data.parity(i);
-      points.push_back({(after ? point.improved() : point.simulated()) * unit.per_us,
-                        point.measured() * unit.per_us});
+      points.push_back(
+          {(after ? point.improved() : point.simulated()) * unit.per_us, point.measured() * unit.per_us});
     }
     chart.Dots(points, after ? "better" : "given");
     chart.Line({{range.low, range.low}, {range.high, range.high}}, "ideal");

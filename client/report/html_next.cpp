@@ -98,8 +98,8 @@ std::string HtmlNextTouches(const v1::Report& report) {
   if (touches.empty()) return "";
   // A purpose that all share is said once.
   const std::string& first = touches[0]->purpose();
-  const bool one_purpose = std::all_of(touches.begin(), touches.end(),
-                                       [&](const auto* next) { return next->purpose() == first; });
+  const bool one_purpose =
+      std::all_of(touches.begin(), touches.end(), [&](const auto* next) { return next->purpose() == first; });
   std::vector<std::string> titles = {">No.",      "Object",        ">Target x y z (mm)",
                                      ">Approach", ">Speed (mm/s)", ">Apart (sigmas)"};
   if (!one_purpose) titles.push_back("What it is for");

@@ -68,7 +68,8 @@ std::string Outlines(const v1::Report& report) {
 
 std::string OneByOne(const v1::Report& report) {
   std::vector<const v1::PhotographError*> errors;
-  for (const v1::PhotographError& error : MainData(report).photographs().photographs()) errors.push_back(&error);
+  for (const v1::PhotographError& error : MainData(report).photographs().photographs())
+    errors.push_back(&error);
   if (errors.size() < 2) return "";
   std::stable_sort(errors.begin(), errors.end(),
                    [](const auto* a, const auto* b) { return a->rmse() > b->rmse(); });

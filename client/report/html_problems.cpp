@@ -35,8 +35,8 @@ std::string HtmlDataProblems(const v1::Report& report) {
   int number = 0;
   for (const v1::DataProblem& problem : report.data_problems()) {
     const std::string id = absl::StrCat("fix", ++number);
-    std::string body =
-        absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(ErrorScale(DataOf(report, problem)), problem));
+    std::string body = absl::StrCat("<p>", Typeset(problem.words()), "</p>",
+                                    ErrorBars(ErrorScale(DataOf(report, problem)), problem));
     if (!problem.fix().empty())
       absl::StrAppend(&body, "<div class=\"row\"><button type=\"button\" data-copy=\"", id,
                       "\">Copy</button><span>fixes the file</span></div>\n<pre id=\"", id, "\">",

@@ -137,7 +137,8 @@ TEST(HtmlReport, SaysHowToMakeItAgain) {
 
 TEST(HtmlReport, TestsEachFingerAgainstThePlaceInTheSession) {
   v1::Report report = MissingEffectsReport();
-  for (v1::CovariateCurve& curve : *report.mutable_data(0)->mutable_curves()) curve.set_p(1), curve.set_p_after(1);
+  for (v1::CovariateCurve& curve : *report.mutable_data(0)->mutable_curves())
+    curve.set_p(1), curve.set_p_after(1);
   v1::FingerDependence* finger = report.mutable_data(0)->mutable_curves(0)->add_fingers();
   finger->set_finger("m");
   finger->set_p(3e-9);

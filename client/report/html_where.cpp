@@ -26,8 +26,7 @@ std::string Slices(const v1::DataReport& data) {
                                               ">Share of the excess", "", ">Mean residual", "In words"}),
                                    "<tbody>");
   for (const v1::Slice& slice : data.where()) {
-    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"),
-                    NumberCell(Count(slice.count())),
+    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"), NumberCell(Count(slice.count())),
                     NumberCell(Share(slice.share_of_excess_error())),
                     Cell(Bar(slice.share_of_excess_error(), "given"), "barcell narrow"),
                     NumberCell(scale.Signed(slice.mean_residual())), Cell(Typeset(slice.words())), "</tr>\n");
@@ -37,7 +36,8 @@ std::string Slices(const v1::DataReport& data) {
       absl::StrCat(
           "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured "
           "minus simulated: positive means that ",
-          scale.pictures() ? "the picture is brighter" : "the real contact came later", " than the model says."));
+          scale.pictures() ? "the picture is brighter" : "the real contact came later",
+          " than the model says."));
 }
 
 // "Object", "Time in the session".
@@ -63,7 +63,8 @@ std::string Groups(const v1::DataReport& data) {
   std::string grid;
   for (const v1::GroupError::Kind kind : order) {
     if (kinds[kind].size() < 2) continue;  // one group is the whole set
-    std::string table = absl::StrCat("<table>", HeaderRow({GroupTitle(kind), ">RMSE", "", ">of excess"}), "<tbody>");
+    std::string table =
+        absl::StrCat("<table>", HeaderRow({GroupTitle(kind), ">RMSE", "", ">of excess"}), "<tbody>");
     for (const v1::GroupError* group : kinds[kind]) {
       absl::StrAppend(
           &table, "<tr title=\"",
@@ -123,8 +124,7 @@ std::string CurvePair(const ErrorScale& scale, const v1::CovariateCurve& curve, 
   std::string pair;
   for (const bool after : {false, true}) {
     if (after && !improved) break;
-    Chart chart(improved ? 232 : 480, 190,
-                after ? "improved model" : "given model", x_axis, y_axis);
+    Chart chart(improved ? 232 : 480, 190, after ? "improved model" : "given model", x_axis, y_axis);
     chart.ZeroLine();
     std::vector<std::string> fingers;
     for (const v1::CurveBin& bin : curve.bins()) {
@@ -204,9 +204,9 @@ std::string Curves(const v1::DataReport& data, bool improved) {
       "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
       "permutation, corrected for the number of covariates",
       scale.pictures() ? "; pictures of one pose count as one.</p>\n"
-                                : " (and of fingers, where each is tested alone). Only differences between "
-                                  "fingers are measured, so what "
-                                  "one finger does shows in the others with the other sign.</p>\n");
+                       : " (and of fingers, where each is tested alone). Only differences between "
+                         "fingers are measured, so what "
+                         "one finger does shows in the others with the other sign.</p>\n");
 }
 
 }  // namespace

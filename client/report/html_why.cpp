@@ -63,7 +63,8 @@ std::string NotFitted(const v1::Report& report) {
     if (candidate.rmse() > 0 || candidate.note().empty()) continue;
     std::vector<std::string>& names = effects[candidate.note()];
     if (names.empty()) notes.push_back(candidate.note());
-    names.push_back(absl::StrCat(candidate.effect(), candidate.scope().kind() == v1::Scope::OBJECT ? " (per object)" : ""));
+    names.push_back(absl::StrCat(candidate.effect(),
+                                 candidate.scope().kind() == v1::Scope::OBJECT ? " (per object)" : ""));
   }
   std::string items;
   for (const std::string& note : notes) {
@@ -127,9 +128,9 @@ std::string CandidateTable(const v1::Report& report) {
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           ScopeWords(candidate), shares ? "<br><small>one of these</small>" : "")),
         NumberCell(EffectProbability(p)), NumberCell(left > 0 ? ErrorScale(*ranked.data).Text(left) : ""),
-        Cell(left > 0 ? Bar(left / whole, p < 0.05 || none ? "share" : "better",
-                            floor > 0 ? floor / whole : -1)
-                      : "",
+        Cell(left > 0
+                 ? Bar(left / whole, p < 0.05 || none ? "share" : "better", floor > 0 ? floor / whole : -1)
+                 : "",
              "barcell"));
     if (candidate.note().empty()) {
       table += ParameterCells(candidate.parameters());

@@ -22,12 +22,12 @@ struct JointRung {
 
 std::string ShownBy(const v1::Step& step) {
   if (step.shown_by_size() > 1) return "both";
-  return step.shown_by().empty() ? ""
-                                 : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone";
+  return step.shown_by().empty() ? "" : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone";
 }
 
 template <typename Error>
-JointRung RungOf(const v1::Report& report, std::string name, const Error& error_of, std::string shown_by = "") {
+JointRung RungOf(const v1::Report& report, std::string name, const Error& error_of,
+                 std::string shown_by = "") {
   JointRung rung{std::move(name), {}, std::move(shown_by)};
   for (const v1::DataReport& data : report.data())
     rung.errors.push_back(ErrorScale(data).Text(error_of(data)));
@@ -40,7 +40,9 @@ std::vector<JointRung> RungsOfBoth(const v1::Report& report) {
   for (int i = 0; i < report.steps_size(); ++i)
     rungs.push_back(RungOf(
         report, absl::StrCat("+ ", StepName(report.steps(i))),
-        [i](const v1::DataReport& data) { return i < data.after_step_size() ? data.after_step(i).rmse() : 0; },
+        [i](const v1::DataReport& data) {
+          return i < data.after_step_size() ? data.after_step(i).rmse() : 0;
+        },
         ShownBy(report.steps(i))));
   const auto has_floor = [](const v1::DataReport& data) { return data.noise_floor() > 0; };
   if (std::all_of(report.data().begin(), report.data().end(), has_floor))
@@ -131,7 +133,8 @@ std::string HtmlJoint(const v1::Report& report) {
     value_titles.push_back(absl::StrCat(">", readings, " alone"));
   }
   rung_titles.push_back("Shown by");
-  const auto row = [](const std::string& name, const std::vector<std::string>& numbers, const std::string& last) {
+  const auto row = [](const std::string& name, const std::vector<std::string>& numbers,
+                      const std::string& last) {
     std::string html = absl::StrCat("<tr>", Cell(Escape(name)));
     for (const std::string& number : numbers) html += NumberCell(number);
     return absl::StrCat(html, last, "</tr>\n");

@@ -71,7 +71,7 @@ void AddCurve(const char* covariate, const char* unit, double from, double to, d
       v1::CurveBin* bin = curve->add_bins();
       bin->set_centre(from + (to - from) * u);
       bin->set_mean_residual(size_us * (finger - 1) * (p < 0.01 ? u * u : 0) +
-                                floor_us * 0.1 * random.Normal());
+                             floor_us * 0.1 * random.Normal());
       bin->set_std_error(floor_us * 0.12);
       bin->set_after(floor_us * 0.12 * random.Normal());
       bin->set_count(80);
@@ -80,8 +80,8 @@ void AddCurve(const char* covariate, const char* unit, double from, double to, d
   }
 }
 
-void AddGroup(v1::GroupError::Kind kind, const std::string& name, uint32_t touches, double rmse_us, double share,
-              v1::DataReport* data) {
+void AddGroup(v1::GroupError::Kind kind, const std::string& name, uint32_t touches, double rmse_us,
+              double share, v1::DataReport* data) {
   v1::GroupError* group = data->add_groups();
   group->set_kind(kind);
   group->set_name(name);
@@ -94,15 +94,16 @@ void AddGroup(v1::GroupError::Kind kind, const std::string& name, uint32_t touch
 void AddGroups(double initial_us, v1::DataReport* data) {
   const int objects = data->set().objects_size();
   for (int i = 0; i < objects; ++i) {
-    AddGroup(v1::GroupError::OBJECT, data->set().objects(i), 960 / objects, initial_us * (0.7 + 0.3 * i), 1.0 / objects,
-             data);
+    AddGroup(v1::GroupError::OBJECT, data->set().objects(i), 960 / objects, initial_us * (0.7 + 0.3 * i),
+             1.0 / objects, data);
   }
   for (const char* face : {"front", "back", "left", "right", "top", "bottom"}) {
-    AddGroup(v1::GroupError::FACE, face, 160, initial_us * (face[0] == 't' ? 0.4 : 1.05), face[0] == 't' ? 0.05 : 0.19,
-             data);
+    AddGroup(v1::GroupError::FACE, face, 160, initial_us * (face[0] == 't' ? 0.4 : 1.05),
+             face[0] == 't' ? 0.05 : 0.19, data);
   }
   for (const std::string& finger : data->fingers()) {
-    AddGroup(v1::GroupError::FINGER, finger, 960, finger == "m" ? initial_us * 1.2 : initial_us * 0.9, 1.0 / 3, data);
+    AddGroup(v1::GroupError::FINGER, finger, 960, finger == "m" ? initial_us * 1.2 : initial_us * 0.9,
+             1.0 / 3, data);
   }
   for (int round = 1; round <= 4; ++round) {
     AddGroup(v1::GroupError::ROUND, absl::StrCat(round), 240, initial_us * (1 + 0.01 * round), 0.25, data);

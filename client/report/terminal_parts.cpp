@@ -148,8 +148,9 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
         step.equivalent().empty() ? "" : absl::StrCat("one of ", 1 + step.equivalent_size(), ", see below");
     if (step.shown_by_size() > 0)
       absl::StrAppend(&note, note.empty() ? "" : "; ", "shown by ",
-                      step.shown_by_size() > 1 ? "touches and pictures"
-                                               : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone");
+                      step.shown_by_size() > 1
+                          ? "touches and pictures"
+                          : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone");
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(scale, before, after), note, TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
@@ -215,7 +216,8 @@ void AddRest(const v1::Unexplained& rest, const ErrorScale& scale, TextLayout* o
   }
   std::string text = absl::StrCat("A suggestion, not a cause: ", rest.formula());
   if (rest.heldout_gain() > 0) {
-    absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen ", scale.readings());
+    absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen ",
+                    scale.readings());
   }
   const std::string nearest = NearestEffectWords(rest);
   if (!nearest.empty()) absl::StrAppend(&text, "; ", nearest);

@@ -55,8 +55,7 @@ void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
     rows.push_back(
         {{absl::StrCat("image ", error.image())},
          {error.object()},
-         {improved ? scale.Change(error.rmse(), error.rmse_after()) : scale.Text(error.rmse()),
-          true},
+         {improved ? scale.Change(error.rmse(), error.rmse_after()) : scale.Text(error.rmse()), true},
          {std::isnan(error.silhouette_iou()) ? ""
                                              : absl::StrCat("outline IoU ", Fixed(error.silhouette_iou(), 3)),
           false, TextLayout::kDim}});
@@ -70,12 +69,12 @@ void AddNextPhotographs(const v1::Report& report, TextLayout* out) {
   for (const v1::NextMeasurement& next : report.next()) {
     if (!next.has_photograph()) continue;
     const std::string verdict = CountToVerdict(next);
-    rows.push_back({{absl::StrCat("picture of ", next.object())},
-                    {absl::StrCat("from ", Place(next.photograph().eye_m()), " mm at ",
-                                  Place(next.photograph().at_m()), " mm")},
-                    {next.separation() > 0 ? absl::StrCat(Number(next.separation(), 2), " sigmas") : "", true},
-                    {absl::StrCat(next.purpose(), verdict.empty() ? "" : ": ", verdict), false,
-                     TextLayout::kDim}});
+    rows.push_back(
+        {{absl::StrCat("picture of ", next.object())},
+         {absl::StrCat("from ", Place(next.photograph().eye_m()), " mm at ", Place(next.photograph().at_m()),
+                       " mm")},
+         {next.separation() > 0 ? absl::StrCat(Number(next.separation(), 2), " sigmas") : "", true},
+         {absl::StrCat(next.purpose(), verdict.empty() ? "" : ": ", verdict), false, TextLayout::kDim}});
   }
   if (!rows.empty()) out->Label("Next");
   out->Rows(rows);

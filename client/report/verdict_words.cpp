@@ -96,7 +96,7 @@ std::string CountToVerdict(const v1::NextMeasurement& next) {
   if (count == 0) return "";
   const char* what = next.has_photograph() ? "picture" : "touch";
   return absl::StrCat("about ", Count(count), " such ", what,
-                      count == 1             ? ""
+                      count == 1              ? ""
                       : next.has_photograph() ? "s"
                                               : "es",
                       " to a verdict (6 nats)");

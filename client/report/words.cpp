@@ -244,7 +244,8 @@ std::vector<Rung> Ladder(const v1::Report& report) {
   if (!(data.initial().rmse() > 0)) return rungs;
   const auto add = [&](Rung::Kind kind, std::string name, const v1::Quality& quality) {
     rungs.push_back({kind, std::move(name), quality.rmse(),
-                     quality.heldout_rmse() > 0 ? quality.heldout_rmse() : kUnknown, quality.lack_of_fit_p()});
+                     quality.heldout_rmse() > 0 ? quality.heldout_rmse() : kUnknown,
+                     quality.lack_of_fit_p()});
   };
   const auto suggest = [&](Rung::Kind kind, std::string name, double rmse, double heldout) {
     rungs.push_back({kind, std::move(name), rmse, heldout > 0 ? heldout : kUnknown, kUnknown});

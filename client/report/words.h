@@ -20,9 +20,9 @@ std::string Tick(double value);
 std::string Count(uint64_t count);
 
 // Three figures, so that columns of times line up (TimeInWords of base/readable_time.h drops trailing zeros).
-std::string Time(double us);                           // "41.0 ms", "850 us"
-std::string SignedTime(double us);                     // "+9.10 ms"
-std::string TimeChange(double from_us, double to_us);  // "41.0 -> 5.0 ms"
+std::string Time(double us);                                              // "41.0 ms", "850 us"
+std::string SignedTime(double us);                                        // "+9.10 ms"
+std::string TimeChange(double from_us, double to_us);                     // "41.0 -> 5.0 ms"
 std::string Probability(double p);                                        // "0.40", "3e-9", "< 1e-15"
 std::string EffectProbability(double p);                                  // "0.97", "< 0.01", "> 0.99"
 std::string Share(double share);                                          // "98.5 %"

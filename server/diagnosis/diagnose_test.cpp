@@ -526,15 +526,15 @@ TEST(Diagnose, CallsAnEffectSuperfluousAndTakesItOut) {
   EXPECT_THAT(report.superfluous, Contains("object_push")) << report.summary;
   EXPECT_TRUE(report.refitted.empty()) << report.summary;
   EXPECT_THAT(model::FormatModel(report.improved_model.value()), ::testing::Not(HasSubstr("object_push")));
-  EXPECT_NEAR(report.data[0].final->rmse, report.data[0].noise_floor->sigma, 0.1 * report.data[0].noise_floor->sigma);
+  EXPECT_NEAR(report.data[0].final->rmse, report.data[0].noise_floor->sigma,
+              0.1 * report.data[0].noise_floor->sigma);
 }
 
 TEST(Diagnose, IsNeverCertain) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  for (const report::Step& step : report.steps)
-    EXPECT_LE(step.probability, selection::kMaxProbability);
+  for (const report::Step& step : report.steps) EXPECT_LE(step.probability, selection::kMaxProbability);
   for (const report::Candidate& candidate : report.data[0].candidates)
     EXPECT_LE(candidate.probability, selection::kMaxProbability);
 }

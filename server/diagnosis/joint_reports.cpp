@@ -147,7 +147,7 @@ class JointDiagnoser {
   // One model that holds what both kinds show; none: nothing changed.
   std::optional<model::Model> Improved() const {
     const std::optional<model::Model>&touches = parts_.touches.improved_model,
-                              &pictures = parts_.photographs.improved_model;
+          &pictures = parts_.photographs.improved_model;
     if (parts_.shared.steps.empty() && !touches && !pictures) return std::nullopt;
     model::Model both = PartOf(touches ? *touches : parts_.shared.in_place, false);
     const model::Model of_pictures = PartOf(pictures ? *pictures : parts_.shared.in_place, true);
@@ -164,7 +164,8 @@ class JointDiagnoser {
 
 }  // namespace
 
-absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input,
+                                                  const DiagnosisContext& context) {
   TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis photographs,
                               ComparePhotographSet(PhotographsOf(input), context));
   TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches, CompareTouches(TouchesOf(input), context));

@@ -93,8 +93,7 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
 
 absl::StatusOr<report::Diagnosis> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
                                                 const Engine& engine) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders,
-                              PhotographBlunders(input, context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders, PhotographBlunders(input, context));
   if (blunders) return *std::move(blunders);
   return Reported(input, context, engine);
 }

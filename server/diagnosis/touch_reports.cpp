@@ -227,8 +227,8 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   return diagnosis;
 }
 
-absl::StatusOr<report::Diagnosis> WithPhotographEffects(const DiagnosisInput& input, int max_touches, bool always,
-                                                        const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> WithPhotographEffects(const DiagnosisInput& input, int max_touches,
+                                                        bool always, const DiagnosisContext& context) {
   const PhotographEffects photographs(input);
   TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis diagnosis,
                               Diagnosed(photographs.touches, max_touches, always, context));
@@ -239,7 +239,8 @@ absl::StatusOr<report::Diagnosis> WithPhotographEffects(const DiagnosisInput& in
 
 }  // namespace
 
-absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
+                                                 const DiagnosisContext& context) {
   const PhotographEffects photographs(given);
   const DiagnosisInput& input = photographs.touches;
   if (!input.set->has_poses) return DiagnosePoseFree(input, context, false);
@@ -256,8 +257,8 @@ absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given, co
   AddHowWrong(*workspace, residuals, &diagnosis);
   report::DataReport& data = diagnosis.data[0];
   if (data.noise_floor)
-    report::AddResiduals(DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal, residuals,
-                                      data.noise_floor->sigma * kSecondsPerMicrosecond),
+    report::AddResiduals(DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,
+                                      residuals, data.noise_floor->sigma * kSecondsPerMicrosecond),
                          &data);
   photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);

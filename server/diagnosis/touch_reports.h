@@ -10,7 +10,8 @@
 namespace touchstone::diagnosis {
 
 // As Compare, Diagnose and Propose (diagnose.h), of `input.set`.
-absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& input, const DiagnosisContext& context);
+absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& input,
+                                                 const DiagnosisContext& context);
 absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input,
                                                   const DiagnosisContext& context);
 absl::StatusOr<report::Diagnosis> ProposeTouches(const DiagnosisInput& input, int max_touches,

@@ -259,9 +259,8 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
       alone.images = nullptr;
     else
       alone.set = nullptr;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        v1::Report report,
-        AsReport(touchstone::diagnosis::Propose(alone, of_touches ? touches : photographs, how)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, AsReport(touchstone::diagnosis::Propose(
+                                                       alone, of_touches ? touches : photographs, how)));
     if (both)
       report.add_warnings(of_touches
                               ? "proposed from the touches alone: the photographs of the set took no part"

@@ -119,9 +119,9 @@ std::string NameInFiles(const std::string& name, int number) {
 absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::MeshFile& file) {
   const std::string place = absl::StrCat("mesh '", file.name(), "'");
   geometry::MeshImport import;
-  if (file.unit() != v1::MeshFile::LENGTH_UNIT_UNSPECIFIED) 
+  if (file.unit() != v1::MeshFile::LENGTH_UNIT_UNSPECIFIED)
     import.unit = NameInFiles(v1::MeshFile::LengthUnit_Name(file.unit()), file.unit());
-  if (file.up() != v1::MeshFile::AXIS_UNSPECIFIED) 
+  if (file.up() != v1::MeshFile::AXIS_UNSPECIFIED)
     import.up = NameInFiles(v1::MeshFile::Axis_Name(file.up()), file.up());
   if (file.scale() != 0) import.scale = file.scale();
   if (file.fit_mm() != 0) import.fit_mm = file.fit_mm();
@@ -133,8 +133,7 @@ absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::M
                                                    absl::StrJoin(geometry::MeshFormatNames(), ", "),
                                                    " was expected"));
   const std::string format = NameInFiles(v1::MeshFile::Format_Name(file.format()), file.format());
-  auto mesh =
-      geometry::ReadMeshBytes(absl::StrCat(file.name(), ".", format), format, file.data(), import);
+  auto mesh = geometry::ReadMeshBytes(absl::StrCat(file.name(), ".", format), format, file.data(), import);
   if (!mesh.ok()) return in_place(mesh.status());
   auto surface = geometry::Surface::Create(file.name(), *std::move(mesh));
   if (!surface.ok()) return in_place(surface.status());

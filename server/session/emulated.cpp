@@ -25,8 +25,8 @@ int CountEmulated(const MeasurementSet& set) {
   const auto found = set.covariates.find(kEmulatedCovariate);
   if (found == set.covariates.end()) return 0;
   // An empty field is NaN: nobody said that it is.
-  return static_cast<int>(
-      std::count_if(found->second.begin(), found->second.end(), [](double value) { return std::abs(value) > 0; }));
+  return static_cast<int>(std::count_if(found->second.begin(), found->second.end(),
+                                        [](double value) { return std::abs(value) > 0; }));
 }
 
 }  // namespace touchstone::session

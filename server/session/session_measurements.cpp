@@ -21,8 +21,8 @@ Eigen::Vector3d VectorOf(const v1::Vector3& v) {
 
 }  // namespace
 
-absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done, bool emulated,
-                                                             const std::string& where) {
+absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done,
+                                                             bool emulated, const std::string& where) {
   std::vector<MeasuredTouch> touches;
   std::vector<uint64_t> ids;
   for (const JournalTouch& touch : done) {

@@ -20,8 +20,8 @@ absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& jo
 
 // The same of touches that are all done; `emulated`: of their session, becomes the column of emulated.h; `where` begins an
 // error.
-absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done, bool emulated,
-                                                             const std::string& where);
+absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done,
+                                                             bool emulated, const std::string& where);
 
 // The set that ParseMeasurementSet reads from FormatMeasurements(touches), bit for bit, and refused where it would
 // be. At least one touch, all with the same number of times, at least one. `origin` is what messages call it.

@@ -102,7 +102,8 @@ void AddUnitsOfTime(std::vector<Mistake>* mistakes) {
   static constexpr Factor kFactors[] = {{10, ""},  {100, ""},  {1000, "milliseconds"}, {1e6, "seconds"},
                                         {0.1, ""}, {0.01, ""}, {1e-3, "nanoseconds"},  {1e-6, "picoseconds"}};
   for (const Factor& factor : kFactors) {
-    Mistake mistake{ProblemKind::kUnitsTime, absl::StrCat("times x ", FactorInWords(factor.factor)), "", {}, {}};
+    Mistake mistake{
+        ProblemKind::kUnitsTime, absl::StrCat("times x ", FactorInWords(factor.factor)), "", {}, {}};
     const bool named = std::abs(std::log10(factor.factor)) >= 3;
     mistake.words = named ? absl::StrCat("the times are ", factor.words, ", not microseconds")
                           : absl::StrCat("the times are ",
@@ -182,8 +183,11 @@ void AddUnitsOfLength(std::vector<Mistake>* mistakes) {
 void AddShifts(std::vector<Mistake>* mistakes) {
   for (int size = 1; size <= kMaxShift; ++size)
     for (const int shift : {size, -size}) {
-      Mistake mistake{
-          ProblemKind::kRowShift, absl::StrCat(shift > 0 ? "+" : "", shift, size == 1 ? " row" : " rows"), "", {}, {}};
+      Mistake mistake{ProblemKind::kRowShift,
+                      absl::StrCat(shift > 0 ? "+" : "", shift, size == 1 ? " row" : " rows"),
+                      "",
+                      {},
+                      {}};
       mistake.words = absl::StrCat("the times of each row belong to the touch ", size == 1 ? "" : "two rows ",
                                    shift > 0 ? "after" : "before", " it");
       mistake.fix.shift_rows = shift;

@@ -13,8 +13,8 @@ using selection::ProblemKind;
 
 struct Mistake {
   ProblemKind kind = ProblemKind::kFingerOrder;
-  std::string detail;        // as of DataProblem
-  std::string words;         // "columns l and m of the times are exchanged", to follow "It looks as if"
+  std::string detail;  // as of DataProblem
+  std::string words;   // "columns l and m of the times are exchanged", to follow "It looks as if"
   session::MeasurementFix fix;
   std::vector<std::string> objects;  // that it concerns, by their names in the file; empty: all
   bool free_size = false;            // a size was fitted, not only tried

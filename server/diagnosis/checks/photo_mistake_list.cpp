@@ -174,10 +174,10 @@ std::vector<CandidateMistake> MistakesOfModels(const model::Model& model) {
         at += count;
       }
       if (!any) continue;
-      CandidateMistake mistake =
-          OfSet(ProblemKind::kUnitsAngle, absl::StrCat(instance.effect->name, " x ", radians ? "180/pi" : "pi/180"),
-                absl::StrCat("the model gives the angle of ", instance.effect->name, " in ",
-                             radians ? "radians" : "degrees of degrees", ", where degrees are expected"));
+      CandidateMistake mistake = OfSet(
+          ProblemKind::kUnitsAngle, absl::StrCat(instance.effect->name, " x ", radians ? "180/pi" : "pi/180"),
+          absl::StrCat("the model gives the angle of ", instance.effect->name, " in ",
+                       radians ? "radians" : "degrees of degrees", ", where degrees are expected"));
       if (!radians)
         mistake.words = absl::StrCat("the angle of ", instance.effect->name,
                                      " was turned into degrees twice in the model");

@@ -124,7 +124,7 @@ struct PhotographDiagnosis {
   std::vector<std::string> superfluous;
   std::vector<PhotographDataProblem> data_problems;
   std::optional<UnexplainedPhotographs> unexplained;
-  int images_needed = 0;  // with kTooLittleData
+  int images_needed = 0;                       // with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
   std::vector<ProposedPhotograph> next_photographs;
 

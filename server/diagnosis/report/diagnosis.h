@@ -53,7 +53,7 @@ struct Step {
   std::vector<inference::ParameterEstimate> parameters;
   std::string meaning, check_on_rig, remedy, words;
   std::vector<DataKind> shown_by;  // of a joint diagnosis
-  model::Model model;              // with it and all before it; without effects where it changes no expectation
+  model::Model model;  // with it and all before it; without effects where it changes no expectation
 };
 
 // One effect of the catalogue as the only step.

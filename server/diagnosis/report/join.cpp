@@ -61,8 +61,8 @@ std::vector<DataKind> KindsOf(const std::string& shown_by) {
 }
 
 std::string ErrorsInWords(const JointQuality& quality) {
-  return absl::StrFormat("%.3g ms on touches and %.3g grey levels on photographs", quality.touches.rmse / 1000,
-                         quality.photographs.rmse);
+  return absl::StrFormat("%.3g ms on touches and %.3g grey levels on photographs",
+                         quality.touches.rmse / 1000, quality.photographs.rmse);
 }
 
 // Of the value that gains most by the other kind.
@@ -167,7 +167,8 @@ void AddSteps(const JointParts& parts, Diagnosis* both) {
 
 // One paragraph: what both show together, then each kind.
 std::string SummarizeJointly(const JointParts& parts) {
-  std::vector<std::string> sentences = {absl::StrCat("The model is off by ", ErrorsInWords(parts.initial), ".")};
+  std::vector<std::string> sentences = {
+      absl::StrCat("The model is off by ", ErrorsInWords(parts.initial), ".")};
   for (const joint::Conflict& conflict : parts.shared.conflicts)
     sentences.push_back(ConflictInWords(conflict));
   std::vector<std::string> in_place;
@@ -189,7 +190,8 @@ std::string SummarizeJointly(const JointParts& parts) {
   if (!parts.shared.conflicts.empty()) return absl::StrJoin(sentences, " ");
   // The verdicts named here are those that hold with the shared effects in place, as the words after them do.
   const bool shared = !in_place.empty();
-  const std::string place = shared ? absl::StrCat(", with ", absl::StrJoin(in_place, " and "), " in place") : "";
+  const std::string place =
+      shared ? absl::StrCat(", with ", absl::StrJoin(in_place, " and "), " in place") : "";
   for (const auto& [name, own] :
        {std::pair{"Touches", &parts.touches}, std::pair{"Photographs", &parts.photographs}})
     sentences.push_back(

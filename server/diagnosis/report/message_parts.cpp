@@ -34,8 +34,8 @@ v1::Scope ScopeMessage(selection::EffectScope scope,
   v1::Scope message;
   message.set_kind(scope == selection::EffectScope::kObject ? v1::Scope::OBJECT : v1::Scope::RIG);
   for (const inference::ParameterEstimate& estimate : parameters)
-    if (!estimate.object.empty() && std::count(message.objects().begin(), message.objects().end(),
-                                               estimate.object) == 0)
+    if (!estimate.object.empty() &&
+        std::count(message.objects().begin(), message.objects().end(), estimate.object) == 0)
       message.add_objects(estimate.object);
   return message;
 }
@@ -53,8 +53,9 @@ void WriteParameters(const std::vector<inference::ParameterEstimate>& parameters
     value->set_lower(estimate.lower);
     value->set_upper(estimate.upper);
     if (estimate.before) value->set_before(*estimate.before);
-    for (const auto& [kind, error] : {std::pair{v1::DataReport::TOUCHES, estimate.std_error_touches},
-                                      std::pair{v1::DataReport::PHOTOGRAPHS, estimate.std_error_photographs}}) {
+    for (const auto& [kind, error] :
+         {std::pair{v1::DataReport::TOUCHES, estimate.std_error_touches},
+          std::pair{v1::DataReport::PHOTOGRAPHS, estimate.std_error_photographs}}) {
       if (!error) continue;
       v1::ErrorAlone* alone = value->add_alone();
       alone->set_kind(kind);

@@ -58,7 +58,8 @@ TEST(ReportMessage, NamesNoUnitOfAKindOfMeasurement) {
 TEST(ReportMessage, HasTheFieldsThatOthersRelyOn) {
   const std::map<const Descriptor*, std::vector<const char*>> fields = {
       {v1::Report::descriptor(),
-       {"verdict", "data_problems", "superfluous", "refitted", "steps", "data", "next", "summary", "warnings"}},
+       {"verdict", "data_problems", "superfluous", "refitted", "steps", "data", "next", "summary",
+        "warnings"}},
       {v1::DataProblem::descriptor(), {"kind", "detail", "words", "fix", "error_after"}},
       {v1::Step::descriptor(), {"effect", "equivalent", "probability", "scope", "words", "parameters"}},
       {v1::ParameterValue::descriptor(), {"name", "value", "std_error", "unit"}},

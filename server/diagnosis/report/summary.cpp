@@ -48,8 +48,9 @@ std::string NothingUsed(DataKind kind) {
 }
 
 std::string Enough(const DataReport& data) {
-  return data.kind == DataKind::kPhotographs ? absl::StrFormat("pictures from %d poses would do.", data.needed)
-                                             : absl::StrFormat("%d usable touches would do.", data.needed);
+  return data.kind == DataKind::kPhotographs
+             ? absl::StrFormat("pictures from %d poses would do.", data.needed)
+             : absl::StrFormat("%d usable touches would do.", data.needed);
 }
 
 std::string HowWrong(const DataReport& data) {
@@ -101,10 +102,11 @@ std::string WhatRemains(DataKind kind, const Unexplained& rest) {
   const std::string left = ErrorInWords(kind, rest.rmse);
   const std::string words = rest.words.empty() ? "" : absl::StrCat(" ", rest.words);
   if (!rest.formula.empty())
-    return absl::StrCat("What remains follows no effect of the catalogue; it depends on ",
-                        on.empty() ? "something" : on, ". A suggestion: ", rest.formula,
-                        rest.parameters.empty() ? "" : absl::StrCat(" (", ValuesInWords(rest.parameters), ")"),
-                        " would leave ", left, ".", words);
+    return absl::StrCat(
+        "What remains follows no effect of the catalogue; it depends on ", on.empty() ? "something" : on,
+        ". A suggestion: ", rest.formula,
+        rest.parameters.empty() ? "" : absl::StrCat(" (", ValuesInWords(rest.parameters), ")"),
+        " would leave ", left, ".", words);
   if (!rest.lookup_yaml.empty() && !on.empty())
     return absl::StrCat("What remains follows no effect of the catalogue; it depends on ", on,
                         " along a curve that would leave ", left, ".", words);
@@ -127,8 +129,7 @@ void AddCauses(const Diagnosis& diagnosis, std::vector<std::string>* sentences) 
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
     sentences->push_back(absl::StrCat("Missing: ", name, " (", ValuesInWords(step.parameters), ")."));
     if (!step.equivalent.empty())
-      sentences->push_back(
-          absl::StrCat(these, " cannot tell them apart. ", step.discriminating_measurement));
+      sentences->push_back(absl::StrCat(these, " cannot tell them apart. ", step.discriminating_measurement));
     if (!step.words.empty()) sentences->push_back(step.words);
   }
 }
@@ -243,7 +244,8 @@ std::string Summarize(const Diagnosis& diagnosis, bool others_in_place) {
   const DataReport& data = diagnosis.data[0];
   if (data.distributions) return SummarizeDistributions(diagnosis);
   if (data.count == 0 && diagnosis.data_problems.empty())
-    return data.needed == 0 ? NothingUsed(data.kind) : absl::StrCat(NothingUsed(data.kind), " ", Enough(data));
+    return data.needed == 0 ? NothingUsed(data.kind)
+                            : absl::StrCat(NothingUsed(data.kind), " ", Enough(data));
   std::vector<std::string> sentences = {HowWrong(data)};
   if (data.noise_floor)
     if (std::string words = FloorAgainstModel(data.kind, *data.noise_floor); !words.empty())

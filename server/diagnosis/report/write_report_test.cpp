@@ -196,8 +196,8 @@ TEST(ToReport, HasWhatNoEffectExplains) {
 
 TEST(ToReport, HasTheMistakeInTheFileAndItsFix) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kCheckData);
-  diagnosis.data_problems = {
-      {selection::ProblemKind::kFingerOrder, "l <-> m", "Fingers l and m are swapped.", "touchstone session fix", 41000, 5100}};
+  diagnosis.data_problems = {{selection::ProblemKind::kFingerOrder, "l <-> m", "Fingers l and m are swapped.",
+                              "touchstone session fix", 41000, 5100}};
   const v1::Report report = ToReport(diagnosis);
   ASSERT_EQ(report.data_problems_size(), 1);
   const v1::DataProblem& problem = report.data_problems(0);

@@ -150,9 +150,9 @@ enum class ProblemKind {
 // A discrete mistake in a measurement file, and how to fix it.
 struct DataProblem {
   ProblemKind kind = ProblemKind::kFingerOrder;
-  std::string detail;        // "l <-> m"
-  std::string words;         // a sentence for people, with the evidence
-  std::string fix;           // the command that fixes the file; empty: none does
+  std::string detail;  // "l <-> m"
+  std::string words;   // a sentence for people, with the evidence
+  std::string fix;     // the command that fixes the file; empty: none does
   double rmse_before_s = 0,
          rmse_after_s = 0;  // of the model as it was given, on the file as it is and would be
 };

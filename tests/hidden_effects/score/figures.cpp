@@ -221,11 +221,13 @@ bool IsACurve(const Arm& arm, const Scenario& truth) {
 }
 
 bool ClaimsAFall(const v1::Report& report) {
-  return TouchesOf(report).has_final() && TouchesOf(report).final().rmse() < kFall * TouchesOf(report).initial().rmse();
+  return TouchesOf(report).has_final() &&
+         TouchesOf(report).final().rmse() < kFall * TouchesOf(report).initial().rmse();
 }
 
 bool FallIsNotFound(const v1::Report& report, double final_found_us) {
-  return ClaimsAFall(report) && !(std::abs(final_found_us / TouchesOf(report).final().rmse() - 1) <= kFoundWithin);
+  return ClaimsAFall(report) &&
+         !(std::abs(final_found_us / TouchesOf(report).final().rmse() - 1) <= kFoundWithin);
 }
 
 std::vector<Mark> JudgeFigures(const Arm& arm, const Scenario& truth, const v1::Report& report,

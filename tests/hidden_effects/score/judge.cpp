@@ -113,7 +113,8 @@ void JudgeEffects(const Arm& arm, const Scenario& truth, const v1::Report& repor
   marks->push_back({"none added", !added});
   marks->push_back({"says missing effects", report.verdict() == v1::Report::MISSING_EFFECTS});
   if (all_quiet)
-    marks->push_back({"rmse at the floor", TouchesOf(report).final().rmse() <= 1.05 * TouchesOf(report).noise_floor()});
+    marks->push_back(
+        {"rmse at the floor", TouchesOf(report).final().rmse() <= 1.05 * TouchesOf(report).noise_floor()});
 }
 
 void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
@@ -228,7 +229,8 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
       marks.push_back({"noise named", named});
       marks.push_back({"noise within 5 %", sized});
       bool agree = TouchesOf(report).histograms_size() > 0;
-      for (const v1::Histogram& histogram : TouchesOf(report).histograms()) agree &= histogram.p_improved() > 0.001;
+      for (const v1::Histogram& histogram : TouchesOf(report).histograms())
+        agree &= histogram.p_improved() > 0.001;
       marks.push_back({"histograms agree", agree});
       break;
     }
