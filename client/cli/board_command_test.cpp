@@ -59,7 +59,7 @@ TEST_F(BoardCommand, RealPicturesNameRadialDistortionInPixels) {
                                "report.json", "--save-model", "lens.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("Reprojection error"), HasSubstr("+ radial_distortion"),
-                                 HasSubstr("px a coordinate")));
+                                 HasSubstr("px (of one coordinate)")));
   const nlohmann::json report = nlohmann::json::parse(Read("report.json"), nullptr, false);
   const nlohmann::json* radial = nullptr;
   for (const nlohmann::json& step : report["steps"])

@@ -34,15 +34,7 @@ std::string Pill(const v1::Report& report) {
 std::string Facts(const v1::Report& report) {
   std::string text = DataInWords(report, "\u00d7");
   text += ".";
-  const v1::DataReport& data = MainData(report);
-  const Floor floor = NoiseFloorOf(data);
-  if (floor.sigma > 0) {
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data));
-    if (floor.bound) absl::StrAppend(&text, ", an upper bound without repeats");
-    if (!floor.bound && data.set().repeats() > 0)
-      absl::StrAppend(&text, ", from ", Count(data.set().repeats()), " repeats");
-    text += ".";
-  }
+  text += NoiseFloorSentence(MainData(report));
   const std::string times = TimesTheFloor(report);
   if (!times.empty()) absl::StrAppend(&text, " The given model's error is ", times, ".");
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)

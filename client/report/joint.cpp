@@ -13,11 +13,12 @@
 namespace touchstone::client {
 namespace {
 
-// A line of the ladder: an error of each kind of measurement.
-struct JointRung {
-  std::string name;
-  std::vector<std::string> errors;
-  std::string shown_by;
+// A table with a column per kind of measurement; `text_last`: the last column is no number.
+struct JointTable {
+  std::vector<std::string> titles;
+  std::vector<std::vector<std::string>> rows;
+  bool text_last = false;
+  bool IsText(size_t column) const { return column == 0 || (text_last && column + 1 == titles.size()); }
 };
 
 std::string ShownBy(const v1::Step& step) {
@@ -25,61 +26,79 @@ std::string ShownBy(const v1::Step& step) {
   return step.shown_by().empty() ? "" : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone";
 }
 
-template <typename Error>
-JointRung RungOf(const v1::Report& report, std::string name, const Error& error_of,
-                 std::string shown_by = "") {
-  JointRung rung{std::move(name), {}, std::move(shown_by)};
-  for (const v1::DataReport& data : report.data())
-    rung.errors.push_back(ErrorScale(data).Text(error_of(data)));
-  return rung;
-}
-
-std::vector<JointRung> RungsOfBoth(const v1::Report& report) {
-  std::vector<JointRung> rungs = {
-      RungOf(report, "given model", [](const v1::DataReport& data) { return data.initial().rmse(); })};
+// Errors after each step.
+JointTable LadderOfBoth(const v1::Report& report) {
+  JointTable table{{""}, {}, true};
+  const auto add = [&](const std::string& name, const auto& error_of, const std::string& shown_by) {
+    std::vector<std::string>& row = table.rows.emplace_back(1, name);
+    for (const v1::DataReport& data : report.data()) row.push_back(ErrorScale(data).Text(error_of(data)));
+    row.push_back(shown_by);
+  };
+  for (const v1::DataReport& data : report.data()) table.titles.push_back(ErrorScale(data).readings());
+  table.titles.push_back("shown by");
+  add("given model", [](const v1::DataReport& data) { return data.initial().rmse(); }, "");
   for (int i = 0; i < report.steps_size(); ++i)
-    rungs.push_back(RungOf(
-        report, absl::StrCat("+ ", StepName(report.steps(i))),
-        [i](const v1::DataReport& data) {
-          return i < data.after_step_size() ? data.after_step(i).rmse() : 0;
-        },
-        ShownBy(report.steps(i))));
-  const auto has_floor = [](const v1::DataReport& data) { return data.noise_floor() > 0; };
-  if (std::all_of(report.data().begin(), report.data().end(), has_floor))
-    rungs.push_back(
-        RungOf(report, "noise floor", [](const v1::DataReport& data) { return data.noise_floor(); }));
-  return rungs;
+    add(absl::StrCat("+ ", StepName(report.steps(i))),
+        [i](const v1::DataReport& data) { return i < data.after_step_size() ? data.after_step(i).rmse() : 0; },
+        ShownBy(report.steps(i)));
+  if (std::all_of(report.data().begin(), report.data().end(),
+                  [](const v1::DataReport& data) { return data.noise_floor() > 0; }))
+    add("noise floor", [](const v1::DataReport& data) { return data.noise_floor(); }, "");
+  return table;
 }
 
-struct JointValue {
-  std::string name, value;
-  std::vector<std::string> alone;  // of each kind
-};
-
-template <typename Message>
-void AddValues(const v1::Report& report, const Message& message, std::vector<JointValue>* values) {
-  for (const v1::ParameterValue& p : message.parameters()) {
-    if (p.alone().empty()) continue;
-    const std::string unit = p.unit().empty() ? "" : absl::StrCat(" ", p.unit());
-    JointValue value{absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ", p.finger(),
-                                  p.object().empty() ? "" : " of ", p.object()),
-                     absl::StrCat(Number(p.value(), 4), " +- ", Number(p.std_error(), 2), unit),
-                     {}};
-    for (const v1::DataReport& data : report.data()) {
-      const auto own = std::find_if(p.alone().begin(), p.alone().end(),
-                                    [&](const v1::ErrorAlone& one) { return one.kind() == data.kind(); });
-      value.alone.push_back(own == p.alone().end() ? "says nothing"
-                                                   : absl::StrCat("+- ", Number(own->std_error(), 2), unit));
+// Values that both kinds show, with the standard errors that each alone would give.
+JointTable ValuesOfBoth(const v1::Report& report) {
+  JointTable table{{"", "both"}, {}};
+  for (const v1::DataReport& data : report.data())
+    table.titles.push_back(absl::StrCat(ErrorScale(data).readings(), " alone"));
+  const auto add = [&](const auto& message) {
+    for (const v1::ParameterValue& p : message.parameters()) {
+      if (p.alone().empty()) continue;
+      const std::string unit = p.unit().empty() ? "" : absl::StrCat(" ", p.unit());
+      std::vector<std::string>& row = table.rows.emplace_back();
+      row = {absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ", p.finger(),
+                          p.object().empty() ? "" : " of ", p.object()),
+             absl::StrCat(Number(p.value(), 4), " +- ", Number(p.std_error(), 2), unit)};
+      for (const v1::DataReport& data : report.data()) {
+        const auto own = std::find_if(p.alone().begin(), p.alone().end(),
+                                      [&](const v1::ErrorAlone& one) { return one.kind() == data.kind(); });
+        row.push_back(own == p.alone().end() ? "says nothing"
+                                             : absl::StrCat("+- ", Number(own->std_error(), 2), unit));
+      }
     }
-    values->push_back(std::move(value));
-  }
+  };
+  for (const v1::Refit& refit : report.refitted()) add(refit);
+  for (const v1::Step& step : report.steps()) add(step);
+  return table;
 }
 
-std::vector<JointValue> ValuesOfBoth(const v1::Report& report) {
-  std::vector<JointValue> values;
-  for (const v1::Refit& refit : report.refitted()) AddValues(report, refit, &values);
-  for (const v1::Step& step : report.steps()) AddValues(report, step, &values);
-  return values;
+void AddTable(const JointTable& table, TextLayout* out) {
+  std::vector<std::vector<TextLayout::Cell>> rows(1);
+  for (size_t i = 0; i < table.titles.size(); ++i)
+    rows[0].push_back({table.titles[i], !table.IsText(i), TextLayout::kDim});
+  for (const std::vector<std::string>& row : table.rows) {
+    rows.emplace_back();
+    for (size_t i = 0; i < row.size(); ++i) rows.back().push_back({row[i], !table.IsText(i)});
+  }
+  out->Rows(rows);
+}
+
+std::string HtmlTable(const JointTable& table, const std::string& css_class) {
+  std::vector<std::string> titles;
+  for (size_t i = 0; i < table.titles.size(); ++i) {
+    std::string title = table.titles[i];
+    if (!title.empty()) title[0] = absl::ascii_toupper(title[0]);
+    titles.push_back(table.IsText(i) ? title : absl::StrCat(">", title));
+  }
+  std::string html = absl::StrCat("<table", css_class, ">", HeaderRow(titles), "<tbody>");
+  for (const std::vector<std::string>& row : table.rows) {
+    html += "<tr>";
+    for (size_t i = 0; i < row.size(); ++i)
+      html += table.IsText(i) ? Cell(Escape(row[i])) : NumberCell(row[i]);
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table>";
 }
 
 }  // namespace
@@ -98,63 +117,23 @@ std::string FallsOfBoth(const v1::Report& report) {
 
 void AddJoint(const v1::Report& report, TextLayout* out) {
   if (!IsJoint(report)) return;
-  using Cell = TextLayout::Cell;
-  std::vector<std::vector<Cell>> rows(1), values(1);
-  rows[0] = {{""}};
-  values[0] = {{""}, {"both", true, TextLayout::kDim}};
-  for (const v1::DataReport& data : report.data()) {
-    rows[0].push_back({ErrorScale(data).readings(), true, TextLayout::kDim});
-    values[0].push_back({absl::StrCat(ErrorScale(data).readings(), " alone"), true, TextLayout::kDim});
-  }
-  rows[0].push_back({"shown by", false, TextLayout::kDim});
-  for (const JointRung& rung : RungsOfBoth(report)) {
-    rows.push_back({{rung.name}});
-    for (const std::string& error : rung.errors) rows.back().push_back({error, true});
-    rows.back().push_back({rung.shown_by});
-  }
   out->Label("Both");
-  out->Rows(rows);
-  for (const JointValue& value : ValuesOfBoth(report)) {
-    values.push_back({{value.name}, {value.value, true}});
-    for (const std::string& alone : value.alone) values.back().push_back({alone, true});
-  }
-  if (values.size() > 1) out->Rows(values);
+  AddTable(LadderOfBoth(report), out);
+  const JointTable values = ValuesOfBoth(report);
+  if (!values.rows.empty()) AddTable(values, out);
   // A comparison has no more to say of both.
   if (report.verdict() != v1::Report::VERDICT_UNSPECIFIED) out->Paragraph(report.summary());
 }
 
 std::string HtmlJoint(const v1::Report& report) {
   if (!IsJoint(report)) return "";
-  std::vector<std::string> rung_titles = {""}, value_titles = {"Value", ">From both"};
-  for (const v1::DataReport& data : report.data()) {
-    std::string readings = ErrorScale(data).readings();
-    readings[0] = absl::ascii_toupper(readings[0]);
-    rung_titles.push_back(absl::StrCat(">", readings));
-    value_titles.push_back(absl::StrCat(">", readings, " alone"));
-  }
-  rung_titles.push_back("Shown by");
-  const auto row = [](const std::string& name, const std::vector<std::string>& numbers,
-                      const std::string& last) {
-    std::string html = absl::StrCat("<tr>", Cell(Escape(name)));
-    for (const std::string& number : numbers) html += NumberCell(number);
-    return absl::StrCat(html, last, "</tr>\n");
-  };
-  std::string ladder = absl::StrCat("<table class=\"narrow\">", HeaderRow(rung_titles), "<tbody>");
-  for (const JointRung& rung : RungsOfBoth(report))
-    ladder += row(rung.name, rung.errors, Cell(Escape(rung.shown_by)));
   std::string body =
-      Figure(absl::StrCat(ladder, "</tbody></table>"),
+      Figure(HtmlTable(LadderOfBoth(report), " class=\"narrow\""),
              "RMSE of both kinds of data after each step, as comparisons with that model find it.");
-  const std::vector<JointValue> values = ValuesOfBoth(report);
-  if (!values.empty()) {
-    std::string table = absl::StrCat("<div class=\"scroll\"><table>", HeaderRow(value_titles), "<tbody>");
-    for (const JointValue& value : values) {
-      std::vector<std::string> numbers = {value.value};
-      numbers.insert(numbers.end(), value.alone.begin(), value.alone.end());
-      table += row(value.name, numbers, "");
-    }
+  const JointTable values = ValuesOfBoth(report);
+  if (!values.rows.empty()) {
     body += Figure(
-        absl::StrCat(table, "</tbody></table></div>"),
+        absl::StrCat("<div class=\"scroll\">", HtmlTable(values, ""), "</div>"),
         "Fitted to the sum of both log likelihoods. Alone: the standard error that either kind of data would "
         "leave by itself.");
   }

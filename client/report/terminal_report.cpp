@@ -21,18 +21,7 @@ constexpr double kSessionP = 0.01;
 void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
   absl::StrAppend(&text, ".");
-  const v1::DataReport& data = MainData(report);
-  const Floor floor = NoiseFloorOf(data);
-  if (floor.sigma > 0) {
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data));
-    if (floor.bound) {
-      absl::StrAppend(&text, ", an upper bound without repeats.");
-    } else if (data.set().repeats() > 0) {
-      absl::StrAppend(&text, ", from ", Count(data.set().repeats()), " repeats.");
-    } else {
-      absl::StrAppend(&text, ".");
-    }
-  }
+  text += NoiseFloorSentence(MainData(report));
   out->Lead(text);
   for (const std::string& warning : report.warnings())
     out->Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);

@@ -222,19 +222,34 @@ Floor NoiseFloorOf(const v1::DataReport& data) {
   return {data.noise_floor(), data.has_noise() && !data.noise().from_repeats()};
 }
 
+namespace {
+
+// "5.00 ms (0.10 mm at 20 mm/s)", "2.10 grey (levels of 255)".
 std::string FloorWithLength(const v1::DataReport& data) {
-  const ErrorScale scale(data);
   const double us = data.noise_floor();
-  const std::string text = scale.Text(us);
+  const std::string text = ErrorScale(data).Text(us);
   if (data.kind() == v1::DataReport::PHOTOGRAPHS) return absl::StrCat(text, " (levels of 255)");
+  if (data.kind() == v1::DataReport::BOARDS) return absl::StrCat(text, " (of one coordinate)");
   const auto& speeds = data.set().speeds_mm_s();
-  if (speeds.empty() || scale.pictures()) return text;
+  if (speeds.empty()) return text;
   const auto [slowest, fastest] = std::minmax_element(speeds.begin(), speeds.end());
   const std::string slow = Number(us * kSecondsPerMicrosecond * *slowest, 2),
                     fast = Number(us * kSecondsPerMicrosecond * *fastest, 2);
   if (*slowest == *fastest) return absl::StrCat(text, " (", slow, " mm at ", Tick(*slowest), " mm/s)");
   return absl::StrCat(text, " (", slow, " to ", fast, " mm at ", Tick(*slowest), " to ", Tick(*fastest),
                       " mm/s)");
+}
+
+}  // namespace
+
+std::string NoiseFloorSentence(const v1::DataReport& data) {
+  const Floor floor = NoiseFloorOf(data);
+  if (!(floor.sigma > 0)) return "";
+  const uint32_t repeats = data.set().repeats();
+  return absl::StrCat(" Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data),
+                      floor.bound   ? ", an upper bound without repeats."
+                      : repeats > 0 ? absl::StrCat(", from ", Count(repeats), " repeats.")
+                                    : ".");
 }
 
 std::vector<Rung> Ladder(const v1::Report& report) {
@@ -293,7 +308,9 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 std::string SummaryToShow(const v1::Report& report) {
   // Their own part says it at more length.
   if (!report.data_problems().empty()) return "";
-  return MainData(report).initial().rmse() > 0 ? "" : report.summary();
+  // Of boards it counts corners.
+  const v1::DataReport& data = MainData(report);
+  return data.initial().rmse() > 0 && data.kind() != v1::DataReport::BOARDS ? "" : report.summary();
 }
 
 std::string DataInWords(const v1::Report& report, const std::string& times) {

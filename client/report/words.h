@@ -56,8 +56,8 @@ struct Floor {
   bool bound = false;
 };
 Floor NoiseFloorOf(const v1::DataReport& data);
-// "5.00 ms (0.10 mm at 20 mm/s)", "2.10 grey (levels of 255)".
-std::string FloorWithLength(const v1::DataReport& data);
+// " Noise floor 5.00 ms (0.10 mm at 20 mm/s), from 720 repeats."; empty if it is unknown.
+std::string NoiseFloorSentence(const v1::DataReport& data);
 
 // One rung of the ladder.
 struct Rung {

@@ -403,8 +403,8 @@ TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->data[0].count, 0);
-  ASSERT_EQ(report->data.unused.size(), 1u);
-  EXPECT_EQ(report->data.unused.begin()->second.count, set->size());
+  ASSERT_EQ(report->data[0].set_aside.rows.size(), 1u);
+  EXPECT_EQ(report->data[0].set_aside.count(), set->size());
 }
 
 TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
@@ -413,7 +413,8 @@ TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
   const absl::StatusOr<report::Diagnosis> report = Propose(touches::MakeTestInput(rig), 12, {});
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->next.size(), 12u);
-  for (const design::ProposedTouch& touch : report->next) {
+  for (const report::NextMeasurement& next : report->next) {
+    const auto& touch = std::get<design::ProposedTouch>(next);
     EXPECT_GT(std::abs(touch.touch.speed_m_s - 0.02), 0.005);
     EXPECT_GT(touch.separation_sigmas, 0);
     EXPECT_FALSE(touch.purpose.empty());

@@ -8,6 +8,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using selection::ProblemKind;
+
 using ::testing::HasSubstr;
 
 // 3 objects, one after the other: 24 poses in each of 4 rounds, touches 0 to 287.

@@ -9,6 +9,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using selection::ProblemKind;
+
 using session::ImageSetFix;
 
 images::HiddenCamera SmallCamera() {

@@ -14,6 +14,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using selection::ProblemKind;
+
 const std::string kFolder = SharedData() + "/measurements/";
 
 class PublicSets : public ::testing::Test {

@@ -101,7 +101,7 @@ struct Curve {
 struct Unexplained {
   std::vector<selection::CovariateTest> covariates;
   std::string formula, formula_yaml, lookup_yaml, words;
-  double rmse = 0, heldout_rmse = 0, heldout_gain = 0;
+  double rmse = 0, heldout_rmse = 0, heldout_gain = 0;  // with the formula, or the curve
   std::vector<inference::ParameterEstimate> parameters;
   std::string nearest_effect, nearest_formula;
   double nearest_cosine = 0, nearest_formula_share = 0;

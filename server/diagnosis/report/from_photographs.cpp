@@ -15,13 +15,6 @@ Quality QualityOf(const images::GreyQuality& quality) {
   return {quality.rmse_grey, quality.heldout_rmse_grey, quality.lack_of_fit_p};
 }
 
-Candidate WithErrors(const images::RankedPhotographCandidate& from) {
-  Candidate candidate = CandidateOf(from);
-  candidate.rmse = from.rmse_grey;
-  candidate.heldout_rmse = from.heldout_rmse_grey;
-  return candidate;
-}
-
 void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
   diagnosis->refitted = found.refitted;
@@ -32,18 +25,13 @@ void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
   diagnosis->confounded = found.confounded;
   diagnosis->superfluous = found.superfluous;
   for (const images::RankedPhotographCandidate& candidate : found.candidates)
-    data.candidates.push_back(WithErrors(candidate));
-  if (found.unexplained) {
-    data.unexplained = UnexplainedOf(*found.unexplained);
-    data.unexplained->rmse = found.unexplained->rmse_grey;
-    data.unexplained->heldout_rmse = found.unexplained->heldout_rmse_grey;
-  }
-  for (const images::PhotographDataProblem& from : found.data_problems) {
-    DataProblem problem = DataProblemOf(from);
-    problem.error_before = from.rmse_before_grey;
-    problem.error_after = from.rmse_after_grey;
-    diagnosis->data_problems.push_back(std::move(problem));
-  }
+    data.candidates.push_back(CandidateOf(candidate, candidate.rmse_grey, candidate.heldout_rmse_grey));
+  if (found.unexplained)
+    data.unexplained = UnexplainedOf(*found.unexplained, found.unexplained->rmse_grey,
+                                     found.unexplained->heldout_rmse_grey);
+  for (const images::PhotographDataProblem& problem : found.data_problems)
+    diagnosis->data_problems.push_back(
+        DataProblemOf(problem, problem.rmse_before_grey, problem.rmse_after_grey));
   diagnosis->improved_model = found.improved_model;
 }
 

@@ -10,17 +10,8 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-Candidate WithErrors(const selection::RankedCandidate& from) {
-  Candidate candidate = CandidateOf(from);
-  candidate.rmse = Microseconds(from.rmse_s);
-  candidate.heldout_rmse = Microseconds(from.heldout_rmse_s);
-  return candidate;
-}
-
-Unexplained WithErrors(const selection::UnexplainedRest& from) {
-  Unexplained rest = UnexplainedOf(from);
-  rest.rmse = Microseconds(from.rmse_s);
-  rest.heldout_rmse = Microseconds(from.heldout_rmse_s);
+Unexplained RestOfTouches(const selection::UnexplainedRest& from) {
+  Unexplained rest = UnexplainedOf(from, Microseconds(from.rmse_s), Microseconds(from.heldout_rmse_s));
   rest.parameters = from.parameters;
   rest.nearest_effect = from.nearest_effect;
   rest.nearest_cosine = from.nearest_cosine;
@@ -103,10 +94,7 @@ NoiseFloor NoiseFloorOf(const selection::NoiseFloor& from) {
 }
 
 DataProblem DataProblemOfTouches(const selection::DataProblem& from) {
-  DataProblem problem = DataProblemOf(from);
-  problem.error_before = Microseconds(from.rmse_before_s);
-  problem.error_after = Microseconds(from.rmse_after_s);
-  return problem;
+  return DataProblemOf(from, Microseconds(from.rmse_before_s), Microseconds(from.rmse_after_s));
 }
 
 void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
@@ -123,8 +111,9 @@ void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
   for (const selection::RankedCandidate& candidate : ladder.candidates)
-    data.candidates.push_back(WithErrors(candidate));
-  if (ladder.unexplained) data.unexplained = WithErrors(*ladder.unexplained);
+    data.candidates.push_back(CandidateOf(candidate, Microseconds(candidate.rmse_s),
+                                          Microseconds(candidate.heldout_rmse_s)));
+  if (ladder.unexplained) data.unexplained = RestOfTouches(*ladder.unexplained);
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (ladder.changed) diagnosis->improved_model = ladder.improved;
 }

@@ -19,29 +19,12 @@ namespace {
 
 using selection::Verdict;
 
-// Worse ones later.
-int RankOf(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kNone:
-      return 0;
-    case Verdict::kAdequate:
-      return 1;
-    case Verdict::kWrongValues:
-      return 2;
-    case Verdict::kMissingEffects:
-      return 3;
-    case Verdict::kUnexplained:
-      return 4;
-    case Verdict::kTooLittleData:
-      return 5;
-    case Verdict::kCheckData:
-      return 6;
-  }
-  return 0;
-}
-
 Verdict WorseOf(Verdict one, Verdict other) {
-  return RankOf(one) >= RankOf(other) ? one : other;
+  constexpr Verdict kWorseLater[] = {Verdict::kNone,        Verdict::kAdequate,      Verdict::kWrongValues,
+                                     Verdict::kMissingEffects, Verdict::kUnexplained, Verdict::kTooLittleData,
+                                     Verdict::kCheckData};
+  const auto rank = [&](Verdict v) { return std::find(std::begin(kWorseLater), std::end(kWorseLater), v); };
+  return rank(one) >= rank(other) ? one : other;
 }
 
 std::string NameOf(Verdict verdict) {

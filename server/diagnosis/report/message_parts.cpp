@@ -5,23 +5,8 @@
 namespace touchstone::diagnosis::report {
 
 v1::Report::Verdict ToMessage(selection::Verdict verdict) {
-  switch (verdict) {
-    case selection::Verdict::kNone:
-      return v1::Report::VERDICT_UNSPECIFIED;
-    case selection::Verdict::kAdequate:
-      return v1::Report::ADEQUATE;
-    case selection::Verdict::kWrongValues:
-      return v1::Report::WRONG_VALUES;
-    case selection::Verdict::kMissingEffects:
-      return v1::Report::MISSING_EFFECTS;
-    case selection::Verdict::kUnexplained:
-      return v1::Report::UNEXPLAINED;
-    case selection::Verdict::kCheckData:
-      return v1::Report::CHECK_DATA;
-    case selection::Verdict::kTooLittleData:
-      return v1::Report::TOO_LITTLE_DATA;
-  }
-  return v1::Report::VERDICT_UNSPECIFIED;
+  static_assert(static_cast<int>(selection::Verdict::kTooLittleData) == v1::Report::TOO_LITTLE_DATA);
+  return static_cast<v1::Report::Verdict>(static_cast<int>(verdict));
 }
 
 v1::DataReport::Kind ToMessage(DataKind kind) {
