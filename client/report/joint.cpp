@@ -36,14 +36,19 @@ JointTable LadderOfBoth(const v1::Report& report) {
   };
   for (const v1::DataReport& data : report.data()) table.titles.push_back(ErrorScale(data).readings());
   table.titles.push_back("shown by");
-  add("given model", [](const v1::DataReport& data) { return data.initial().rmse(); }, "");
+  add(
+      "given model", [](const v1::DataReport& data) { return data.initial().rmse(); }, "");
   for (int i = 0; i < report.steps_size(); ++i)
-    add(absl::StrCat("+ ", StepName(report.steps(i))),
-        [i](const v1::DataReport& data) { return i < data.after_step_size() ? data.after_step(i).rmse() : 0; },
+    add(
+        absl::StrCat("+ ", StepName(report.steps(i))),
+        [i](const v1::DataReport& data) {
+          return i < data.after_step_size() ? data.after_step(i).rmse() : 0;
+        },
         ShownBy(report.steps(i)));
   if (std::all_of(report.data().begin(), report.data().end(),
                   [](const v1::DataReport& data) { return data.noise_floor() > 0; }))
-    add("noise floor", [](const v1::DataReport& data) { return data.noise_floor(); }, "");
+    add(
+        "noise floor", [](const v1::DataReport& data) { return data.noise_floor(); }, "");
   return table;
 }
 

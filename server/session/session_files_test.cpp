@@ -127,7 +127,8 @@ TEST_F(SessionFiles, AnEmulatorsMarkGoesAlongIntoEveryFileAndBack) {
 TEST_F(SessionFiles, OfAPlanFromAnEmulatedSessionTheSessionSaysWhetherItIs) {
   std::string text = kCsv;
   text.insert(text.find('\n'), ",cov_emulated");
-  for (size_t at = text.find('\n', text.find('\n') + 1); at != std::string::npos; at = text.find('\n', at + 3))
+  for (size_t at = text.find('\n', text.find('\n') + 1); at != std::string::npos;
+       at = text.find('\n', at + 3))
     text.insert(at, ",1");
   ASSERT_TRUE(WriteFileAtomically(csv_, text).ok());
   auto content = ReadSessionCsv(csv_, options_);

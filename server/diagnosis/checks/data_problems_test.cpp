@@ -222,7 +222,8 @@ TEST(DataProblems, StrongPhysicsIsNoMistake) {
       if (seed % 2 == 0) rig.samples_per_face = 1, rig.rounds = 1;  // 30 touches
       const auto problems = ProblemsOf(MakeFile(rig));
       EXPECT_TRUE(problems.empty()) << (rigs[r].empty() ? "nothing" : rigs[r][0].first) << ", seed " << seed
-                                    << ": " << static_cast<int>(problems[0].kind) << ", " << problems[0].words;
+                                    << ": " << static_cast<int>(problems[0].kind) << ", "
+                                    << problems[0].words;
     }
 }
 

@@ -8,21 +8,22 @@ namespace touchstone::diagnosis::report {
 
 template <typename EngineStep>
 Step StepOf(const EngineStep& from) {
-  return {from.effect, from.scope, from.equivalent, from.discriminating_measurement, from.probability,
-          from.gain_nats, from.parameters, from.meaning, from.check_on_rig, from.remedy, from.words, {},
+  return {from.effect,       from.scope,     from.equivalent, from.discriminating_measurement,
+          from.probability,  from.gain_nats, from.parameters, from.meaning,
+          from.check_on_rig, from.remedy,    from.words,      {},
           from.model};
 }
 
 template <typename EngineCandidate>
 Candidate CandidateOf(const EngineCandidate& from, double rmse, double heldout_rmse) {
-  return {from.effect, from.scope, from.note, from.probability, from.gain_nats, from.parameters, rmse,
-          heldout_rmse};
+  return {from.effect,    from.scope,      from.note, from.probability,
+          from.gain_nats, from.parameters, rmse,      heldout_rmse};
 }
 
 template <typename EngineRest>
 Unexplained UnexplainedOf(const EngineRest& from, double rmse, double heldout_rmse) {
-  return {from.covariates, from.formula, from.formula_yaml, from.lookup_yaml, from.words, rmse, heldout_rmse,
-          from.heldout_gain};
+  return {from.covariates, from.formula, from.formula_yaml, from.lookup_yaml,
+          from.words,      rmse,         heldout_rmse,      from.heldout_gain};
 }
 
 template <typename EngineProblem>

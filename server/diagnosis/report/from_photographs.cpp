@@ -27,8 +27,8 @@ void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
   for (const images::RankedPhotographCandidate& candidate : found.candidates)
     data.candidates.push_back(CandidateOf(candidate, candidate.rmse_grey, candidate.heldout_rmse_grey));
   if (found.unexplained)
-    data.unexplained = UnexplainedOf(*found.unexplained, found.unexplained->rmse_grey,
-                                     found.unexplained->heldout_rmse_grey);
+    data.unexplained =
+        UnexplainedOf(*found.unexplained, found.unexplained->rmse_grey, found.unexplained->heldout_rmse_grey);
   for (const images::PhotographDataProblem& problem : found.data_problems)
     diagnosis->data_problems.push_back(
         DataProblemOf(problem, problem.rmse_before_grey, problem.rmse_after_grey));

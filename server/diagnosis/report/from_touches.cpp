@@ -111,8 +111,8 @@ void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
   for (const selection::RankedCandidate& candidate : ladder.candidates)
-    data.candidates.push_back(CandidateOf(candidate, Microseconds(candidate.rmse_s),
-                                          Microseconds(candidate.heldout_rmse_s)));
+    data.candidates.push_back(
+        CandidateOf(candidate, Microseconds(candidate.rmse_s), Microseconds(candidate.heldout_rmse_s)));
   if (ladder.unexplained) data.unexplained = RestOfTouches(*ladder.unexplained);
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (ladder.changed) diagnosis->improved_model = ladder.improved;

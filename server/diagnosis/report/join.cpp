@@ -20,7 +20,7 @@ namespace {
 using selection::Verdict;
 
 Verdict WorseOf(Verdict one, Verdict other) {
-  constexpr Verdict kWorseLater[] = {Verdict::kNone,        Verdict::kAdequate,      Verdict::kWrongValues,
+  constexpr Verdict kWorseLater[] = {Verdict::kNone,           Verdict::kAdequate,    Verdict::kWrongValues,
                                      Verdict::kMissingEffects, Verdict::kUnexplained, Verdict::kTooLittleData,
                                      Verdict::kCheckData};
   const auto rank = [&](Verdict v) { return std::find(std::begin(kWorseLater), std::end(kWorseLater), v); };
