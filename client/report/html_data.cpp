@@ -93,13 +93,9 @@ std::string WorstTouches(const v1::DataReport& data) {
 }  // namespace
 
 std::string HtmlData(const v1::Report& report) {
-  std::string body;
-  for (const v1::DataReport& data : report.data()) {
-    const std::string part = absl::StrCat(Summary(data), Unused(data), WorstTouches(data));
-    if (!part.empty() && report.data_size() > 1)
-      absl::StrAppend(&body, "<h3>", KindName(data.kind()), "</h3>\n");
-    body += part;
-  }
+  const std::string body = PerKind(report, [&](const v1::DataReport& data) {
+    return absl::StrCat(Summary(data), Unused(data), WorstTouches(data));
+  });
   return Section("data", "The data", "", body);
 }
 

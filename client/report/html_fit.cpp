@@ -131,10 +131,9 @@ std::string Histograms(const v1::DataReport& data, bool improved) {
 
 std::string HtmlFit(const v1::Report& report) {
   const bool improved = !report.improved_model_yaml().empty();
-  std::string body;
-  for (const v1::DataReport& data : report.data())
-    absl::StrAppend(&body, Parity(data, improved), Histograms(data, improved));
-  return Section("fit", "Measured against simulated", "", body);
+  return Section("fit", "Measured against simulated", "", PerKind(report, [&](const v1::DataReport& data) {
+                   return absl::StrCat(Parity(data, improved), Histograms(data, improved));
+                 }));
 }
 
 }  // namespace touchstone::client

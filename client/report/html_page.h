@@ -1,6 +1,7 @@
 // Pieces of the HTML report. Each Html* function gives one section, empty if the report has nothing for it.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,10 @@ std::string Typeset(absl::string_view text);
 // <section> with a heading and a line that says what is shown; empty if `body` is.
 std::string Section(absl::string_view id, absl::string_view title, absl::string_view lead,
                     absl::string_view body);
+
+// What `part` gives of each kind of measurement, under its name where there are several.
+std::string PerKind(const v1::Report& report,
+                    const std::function<std::string(const v1::DataReport& data)>& part);
 
 // <figure> with its caption below; the caption says how the numbers were computed.
 std::string Figure(absl::string_view picture, absl::string_view caption, absl::string_view css_class = "");

@@ -137,13 +137,7 @@ std::string RestOf(const v1::DataReport& data) {
 }  // namespace
 
 std::string HtmlUnexplained(const v1::Report& report) {
-  std::string body;
-  for (const v1::DataReport& data : report.data()) {
-    const std::string part = RestOf(data);
-    if (!part.empty() && report.data_size() > 1)
-      absl::StrAppend(&body, "<h3>", KindName(data.kind()), "</h3>\n");
-    body += part;
-  }
+  const std::string body = PerKind(report, RestOf);
   return Section(
       "unexplained", "What no built-in effect explains",
       "A structure that is left after all steps. p: likelihood ratio of the best term, all terms paid for.",

@@ -213,13 +213,9 @@ std::string Curves(const v1::DataReport& data, bool improved) {
 
 std::string HtmlWhere(const v1::Report& report) {
   const bool improved = !report.improved_model_yaml().empty();
-  std::string body;
-  for (const v1::DataReport& data : report.data()) {
-    const std::string part = absl::StrCat(Slices(data), Groups(data), Curves(data, improved));
-    if (!part.empty() && report.data_size() > 1)
-      absl::StrAppend(&body, "<h3>", KindName(data.kind()), "</h3>\n");
-    body += part;
-  }
+  const std::string body = PerKind(report, [&](const v1::DataReport& data) {
+    return absl::StrCat(Slices(data), Groups(data), Curves(data, improved));
+  });
   return Section("where", "Where", "The parts of the data in which the given model is wrong.", body);
 }
 

@@ -229,7 +229,8 @@ std::string FloorWithLength(const v1::DataReport& data) {
   const double us = data.noise_floor();
   const std::string text = ErrorScale(data).Text(us);
   if (data.kind() == v1::DataReport::PHOTOGRAPHS) return absl::StrCat(text, " (levels of 255)");
-  if (data.kind() == v1::DataReport::BOARDS) return absl::StrCat(text, " (of one coordinate)");
+  if (data.kind() == v1::DataReport::BOARDS)
+    return absl::StrCat(text, " (", Number(us / std::sqrt(2.0)), " px a coordinate)");
   const auto& speeds = data.set().speeds_mm_s();
   if (speeds.empty()) return text;
   const auto [slowest, fastest] = std::minmax_element(speeds.begin(), speeds.end());

@@ -4,6 +4,8 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <cmath>
+
 namespace touchstone::diagnosis::report {
 namespace {
 
@@ -56,9 +58,12 @@ DataReport DataOf(const boards::BoardDiagnosis& found, const boards::BoardSet& s
   if (found.final) data.final = QualityOf(*found.final);
   if (found.noise.sigma_px > 0) {
     data.noise_floor.emplace();
-    data.noise_floor->sigma = found.noise.sigma_px;
+    // Of a corner, as the errors are: two coordinates.
+    data.noise_floor->sigma = std::sqrt(2.0) * found.noise.sigma_px;
     data.noise_floor->degrees_of_freedom = found.noise.degrees_of_freedom;
   }
+  if (data.noise_floor && data.initial)
+    data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
   if (!found.rest.empty()) data.unexplained = RestOf(found.rest);
   return data;
 }

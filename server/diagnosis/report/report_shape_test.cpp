@@ -3,6 +3,7 @@
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -148,7 +149,8 @@ TEST(FromBoards, GivesPixelsAndWhatIsLeftWithItsError) {
   EXPECT_EQ(data.unit(), "px");
   EXPECT_EQ(data.set_aside().count(), 1u);
   EXPECT_EQ(data.set_aside().words(), "1: the whole board is not in the picture");
-  EXPECT_DOUBLE_EQ(data.noise_floor(), 0.1);
+  EXPECT_DOUBLE_EQ(data.noise_floor(), std::sqrt(2.0) * 0.1);  // of a corner: two coordinates
+  EXPECT_DOUBLE_EQ(data.reducible_share(), 1 - 0.02 / 1.44);
   EXPECT_FALSE(data.noise().from_repeats());
   ASSERT_EQ(data.after_step_size(), 1);
   EXPECT_DOUBLE_EQ(data.after_step(0).rmse(), 0.4);
