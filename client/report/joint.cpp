@@ -54,7 +54,7 @@ JointTable LadderOfBoth(const v1::Report& report) {
 
 // Values that both kinds show, with the standard errors that each alone would give.
 JointTable ValuesOfBoth(const v1::Report& report) {
-  JointTable table{{"", "both"}, {}};
+  JointTable table{{"", "from both"}, {}};
   for (const v1::DataReport& data : report.data())
     table.titles.push_back(absl::StrCat(ErrorScale(data).readings(), " alone"));
   const auto add = [&](const auto& message) {
