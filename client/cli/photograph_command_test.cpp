@@ -98,7 +98,7 @@ TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
   const nlohmann::json report = Report({"diagnose", "photos", "--model", "nominal.yaml"});
   EXPECT_EQ(report["verdict"], "ADEQUATE") << report["summary"];
   EXPECT_TRUE(report["steps"].empty());
-  EXPECT_GT(report["photographs"]["silhouette_iou"].get<double>(), 0.99);
+  EXPECT_GT(report["data"][0]["photographs"]["silhouette_iou"].get<double>(), 0.99);
 }
 
 TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {

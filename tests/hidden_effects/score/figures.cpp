@@ -53,7 +53,7 @@ bool SaysWhere(const v1::Step& step, const Strings& words) {
 }
 
 bool IsUnexplainedBy(const v1::Report& report, const Strings& covariates) {
-  const auto& found = TouchesOf(report).unexplained().covariates();
+  const auto& found = TouchEntry(report).unexplained().covariates();
   return report.verdict() == v1::Report::UNEXPLAINED && !found.empty() &&
          BeginsWithAny(found[0].name(), covariates);
 }
@@ -68,7 +68,7 @@ bool CauseIsRight(const Scenario& truth, const v1::Report& report, const Answer&
   const Cause& cause = truth.causes.front();
   // No covariate tells poses apart, so none may be named.
   if (cause.kind == CauseKind::kPoseError && report.verdict() == v1::Report::UNEXPLAINED &&
-      TouchesOf(report).unexplained().covariates().empty())
+      TouchEntry(report).unexplained().covariates().empty())
     return OnlyTrueSteps(report, answer);
   Strings where;
   switch (cause.kind) {
@@ -221,13 +221,13 @@ bool IsACurve(const Arm& arm, const Scenario& truth) {
 }
 
 bool ClaimsAFall(const v1::Report& report) {
-  return TouchesOf(report).has_final() &&
-         TouchesOf(report).final().rmse() < kFall * TouchesOf(report).initial().rmse();
+  return TouchEntry(report).has_final() &&
+         TouchEntry(report).final().rmse() < kFall * TouchEntry(report).initial().rmse();
 }
 
 bool FallIsNotFound(const v1::Report& report, double final_found_us) {
   return ClaimsAFall(report) &&
-         !(std::abs(final_found_us / TouchesOf(report).final().rmse() - 1) <= kFoundWithin);
+         !(std::abs(final_found_us / TouchEntry(report).final().rmse() - 1) <= kFoundWithin);
 }
 
 std::vector<Mark> JudgeFigures(const Arm& arm, const Scenario& truth, const v1::Report& report,

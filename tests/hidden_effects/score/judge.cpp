@@ -114,7 +114,7 @@ void JudgeEffects(const Arm& arm, const Scenario& truth, const v1::Report& repor
   marks->push_back({"says missing effects", report.verdict() == v1::Report::MISSING_EFFECTS});
   if (all_quiet)
     marks->push_back(
-        {"rmse at the floor", TouchesOf(report).final().rmse() <= 1.05 * TouchesOf(report).noise_floor()});
+        {"rmse at the floor", TouchEntry(report).final().rmse() <= 1.05 * TouchEntry(report).noise_floor()});
 }
 
 void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
@@ -142,7 +142,7 @@ void JudgeUnlisted(const Scenario& truth, const v1::Report& report, double formu
   marks->push_back({"unexplained", owned_up});
   marks->push_back({"wrong name instead", !owned_up && report.steps_size() > 0});
   const auto& right = FindUnlisted(truth.unlisted.front().name).covariates;
-  const auto& covariates = TouchesOf(report).unexplained().covariates();
+  const auto& covariates = TouchEntry(report).unexplained().covariates();
   marks->push_back({"right covariate first", covariates.size() > 0 && Contains(right, covariates[0].name())});
   marks->push_back({"formula halves the misfit", formula_cuts_to <= 0.5});
 }
@@ -163,7 +163,7 @@ std::string Number(double value) {
 
 // The distribution differs, or repeats show something; then the truth must be among what would do it.
 void JudgeNoPoses(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
-  const v1::DistributionComparison& distributions = TouchesOf(report).distributions();
+  const v1::DistributionComparison& distributions = TouchEntry(report).distributions();
   const bool found = distributions.p() < 0.01 || distributions.findings_size() > 0;
   marks->push_back({truth.hidden.empty() ? "false detection" : "detects", found});
   if (truth.hidden.empty() || distributions.findings().empty()) return;
@@ -175,7 +175,7 @@ void JudgeNoPoses(const Scenario& truth, const v1::Report& report, std::vector<M
 
 }  // namespace
 
-const v1::DataReport& TouchesOf(const v1::Report& report) {
+const v1::DataReport& TouchEntry(const v1::Report& report) {
   return report.data().empty() ? v1::DataReport::default_instance() : report.data(0);
 }
 
@@ -228,8 +228,8 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
           sized |= std::abs(parameter.value() / truth.sigma_us - 1) < 0.05;
       marks.push_back({"noise named", named});
       marks.push_back({"noise within 5 %", sized});
-      bool agree = TouchesOf(report).histograms_size() > 0;
-      for (const v1::Histogram& histogram : TouchesOf(report).histograms())
+      bool agree = TouchEntry(report).histograms_size() > 0;
+      for (const v1::Histogram& histogram : TouchEntry(report).histograms())
         agree &= histogram.p_improved() > 0.001;
       marks.push_back({"histograms agree", agree});
       break;
@@ -299,7 +299,7 @@ std::string ReportInWords(const v1::Report& report) {
     words += "; refitted " + refit.effect();
     add_values(refit.parameters());
   }
-  if (const v1::DataReport& data = TouchesOf(report); data.has_unexplained()) {
+  if (const v1::DataReport& data = TouchEntry(report); data.has_unexplained()) {
     words += "; unexplained:";
     for (const v1::CovariateTest& test : data.unexplained().covariates()) {
       words += " " + test.name();
@@ -312,7 +312,7 @@ std::string ReportInWords(const v1::Report& report) {
   for (const v1::DataProblem& problem : report.data_problems())
     words += "; check data: " + KindOf(problem) + " " + problem.detail();
   for (const std::string& effect : report.superfluous()) words += "; superfluous " + effect;
-  const v1::DataReport& data = TouchesOf(report);
+  const v1::DataReport& data = TouchEntry(report);
   words += "; rmse " + Number(data.initial().rmse()) + " -> " + Number(data.final().rmse()) + " floor " +
            Number(data.noise_floor()) + " us, p " + Number(data.final().lack_of_fit_p());
   return words;

@@ -17,7 +17,7 @@ struct Mark {
 };
 
 // What the report says of the touches; empty where it says nothing.
-const v1::DataReport& TouchesOf(const v1::Report& report);
+const v1::DataReport& TouchEntry(const v1::Report& report);
 // "finger_order".
 std::string KindOf(const v1::DataProblem& problem);
 

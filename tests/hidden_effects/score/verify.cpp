@@ -53,7 +53,7 @@ std::optional<Scenario> FittedCopy(const Scenario& truth, const v1::Report& repo
     return std::nullopt;
   if (step.parameters_size() != static_cast<int>(hidden.values.size())) return std::nullopt;
   Scenario copy = truth;
-  copy.sigma_us = TouchesOf(report).noise_floor();
+  copy.sigma_us = TouchEntry(report).noise_floor();
   // What the model claims stays as it was.
   if (copy.model_sigma_us == 0) copy.model_sigma_us = truth.sigma_us;
   for (size_t i = 0; i < hidden.values.size(); ++i)
