@@ -50,10 +50,10 @@ TEST_F(AdviceCommand, ACurveOrFormulaIsAddedAndItsErrorFoundAgain) {
     const Outcome again =
         Run({"compare", set, "--model", name + ".yaml", "--mesh-dir", kMeasurements, "--json", "-"});
     ASSERT_EQ(again.exit_code, 0) << again.err;
-    const double found_us = nlohmann::json::parse(again.out)["initial"]["rmse_us"];
-    const double promised_us = report["unexplained"]["rmse_us"];
+    const double found_us = nlohmann::json::parse(again.out)["data"][0]["initial"]["rmse"];
+    const double promised_us = report["data"][0]["unexplained"]["rmse"];
     EXPECT_NEAR(found_us, promised_us, 0.01 * promised_us);
-    EXPECT_LT(found_us, 0.8 * report["initial"]["rmse_us"].get<double>());
+    EXPECT_LT(found_us, 0.8 * report["data"][0]["initial"]["rmse"].get<double>());
   }
 }
 
@@ -84,8 +84,8 @@ TEST_F(AdviceCommand, MendsWhatTheDiagnosisFound) {
     ASSERT_FALSE(after["steps"].empty());
     EXPECT_EQ(after["steps"][0]["effect"], "tip_radius");
     // The error that was promised is the one that is found.
-    EXPECT_NEAR(after["initial"]["rmse_us"].get<double>(),
-                before["data_problems"][0]["rmse_after_us"].get<double>(), 1);
+    EXPECT_NEAR(after["data"][0]["initial"]["rmse"].get<double>(),
+                before["data_problems"][0]["error_after"].get<double>(), 1);
   }
 }
 
@@ -102,7 +102,7 @@ TEST_F(AdviceCommand, AMeshOfTheFolderThatTheSetDoesNotNameIsTried) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const nlohmann::json report = nlohmann::json::parse(outcome.out, nullptr, false);
   EXPECT_EQ(report["verdict"], "CHECK_DATA");
-  EXPECT_EQ(report["data_problems"][0]["kind"], "wrong_mesh");
+  EXPECT_EQ(report["data_problems"][0]["kind"], "WRONG_MESH");
   EXPECT_EQ(report["data_problems"][0]["detail"], "lat15 is elsewhere");
 }
 

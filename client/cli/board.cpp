@@ -3,12 +3,12 @@
 #include <filesystem>
 
 #include "client/cli/model_output.h"
-#include "client/report/report.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/boards/board_pictures.h"
-#include "server/diagnosis/report/board_messages.h"
+#include "server/diagnosis/report/from_boards.h"
+#include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -42,56 +42,6 @@ absl::StatusOr<model::Model> NominalLensModel(const std::string& file) {
   return model::ParseModel(text, file, effects::Catalogue(), model::FilesBeside(file));
 }
 
-std::string VerdictWords(const v1::Report& report) {
-  switch (report.verdict()) {
-    case v1::Report::ADEQUATE:
-      return "The lens is as good as these pictures can tell.";
-    case v1::Report::MISSING_EFFECTS:
-      return "The lens lacks effects; with them left-out pictures are predicted.";
-    case v1::Report::UNEXPLAINED:
-      return "The lens differs in a way that no effect of the catalogue describes.";
-    case v1::Report::TOO_LITTLE_DATA:
-      return "Too few pictures show the whole board.";
-    default:
-      return "";
-  }
-}
-
-// The reprojection error after each step.
-std::string LadderInWords(const v1::Report& report) {
-  if (!report.has_initial()) return "";
-  std::string words = absl::StrFormat("\n%-22s %12s %12s %12s\n", "Reprojection error", "fitted px",
-                                      "left-out px", "lack of fit");
-  const auto add = [&](const std::string& name, const auto& quality) {
-    absl::StrAppendFormat(&words, "%-22s %12.4f %12.4f   p = %.2g\n", name, quality.rmse_px(),
-                          quality.heldout_rmse_px(), quality.lack_of_fit_p());
-  };
-  add("nominal lens", report.initial());
-  for (const v1::Step& step : report.steps()) add(absl::StrCat("+ ", step.effect()), step);
-  if (report.noise_floor().sigma_px() > 0)
-    absl::StrAppendFormat(&words,
-                          "Noise of a corner: %.4f px a coordinate, at most (from residuals, no repeats)\n",
-                          report.noise_floor().sigma_px());
-  return words;
-}
-
-std::string BoardReportInWords(const v1::Report& report) {
-  std::string words = absl::StrCat(VerdictWords(report), "\n\n", report.summary(), "\n");
-  for (const v1::Step& step : report.steps()) {
-    absl::StrAppend(&words, "\n", step.effect(), "  probability ",
-                    absl::StrFormat("%.3f", step.probability()), "\n");
-    for (const v1::ParameterValue& value : step.parameters())
-      absl::StrAppendFormat(&words, "  %-10s %-2s %10.5g +- %.2g %s\n", value.name(), value.finger(),
-                            value.value(), value.std_error(), value.unit());
-    if (step.equivalent_size() > 0)
-      absl::StrAppend(&words, "  these pictures cannot tell it from ", absl::StrJoin(step.equivalent(), ", "),
-                      "\n");
-  }
-  absl::StrAppend(&words, LadderInWords(report));
-  for (const std::string& warning : report.warnings()) absl::StrAppend(&words, "\nNote: ", warning, "\n");
-  return words;
-}
-
 }  // namespace
 
 void AddBoardOptions(CLI::App* command, BoardOptions* options) {
@@ -118,15 +68,13 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardSet set, boards::ReadBoardPictures(options.set, layout));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardDiagnosis diagnosis,
                               boards::DiagnoseBoards(set, model, options.seed));
-  v1::Report report = diagnosis::report::WriteBoardReport(set, diagnosis);
+  v1::Report report = diagnosis::report::ToReport(diagnosis::report::FromBoards(diagnosis, set));
   AddClientProvenance(cli.command_line(), "", {}, &report);
-  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
-  if (!options.ReportOnStdout()) TOUCHSTONE_RETURN_IF_ERROR(cli.Print(BoardReportInWords(report)));
+  TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
   if (save_model.empty()) return absl::OkStatus();
   model::Model improved = model;
-  if (!diagnosis.improved_model_yaml.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(improved, model::ParseModel(diagnosis.improved_model_yaml,
-                                                            "the improved model", effects::Catalogue()));
+  if (diagnosis.improved_model) {
+    improved = *diagnosis.improved_model;
     improved.name = std::filesystem::path(save_model).stem().string();
   }
   TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", save_model, improved));

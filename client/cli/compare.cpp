@@ -25,7 +25,7 @@ void AddCompare(Cli* cli) {
       nullptr, "compare", "Says how wrong a model is against measured touches or photographs, and where.",
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
-      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq .initial\n"
+      "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq '.data[0].initial'\n"
       "touchstone compare photos --model nominal.yaml --mesh-dir meshes --html report.html",
       [cli, options] { return RunCompare(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);

@@ -18,6 +18,7 @@
 #include "client/cli/journal_session.h"
 #include "client/cli/session_images.h"
 #include "client/report/report.h"
+#include "server/base/check.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
@@ -349,10 +350,19 @@ absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes)
     cli_.Detail(absl::StrCat("sending ", source.path, ": the server lacks it"));
     v1::MeshFile* file = evidence_.add_meshes();
     file->set_name(source.name);
-    file->set_format(absl::AsciiStrToLower(fs::path(source.path).extension().string().substr(1)));
+    // What was read above has a format, a unit and an axis of these names.
+    const auto named = [](const std::string& name) { return absl::AsciiStrToUpper(name); };
+    v1::MeshFile::Format format;
+    v1::MeshFile::LengthUnit unit;
+    v1::MeshFile::Axis up;
+    TOUCHSTONE_CHECK(
+        v1::MeshFile::Format_Parse(named(fs::path(source.path).extension().string().substr(1)), &format));
+    TOUCHSTONE_CHECK(v1::MeshFile::LengthUnit_Parse(named(source.unit), &unit));
+    TOUCHSTONE_CHECK(v1::MeshFile::Axis_Parse(named(source.up), &up));
+    file->set_format(format);
     TOUCHSTONE_ASSIGN_OR_RETURN(*file->mutable_data(), ReadFile(source.path));
-    file->set_unit(source.unit);
-    file->set_up(source.up);
+    file->set_unit(unit);
+    file->set_up(up);
     file->set_scale(source.scale);
     file->set_fit_mm(source.fit_mm);
   }

@@ -21,10 +21,15 @@ struct DiagnoseOptions : ComparisonOptions {
   BoardOptions board;
 };
 
-// The formula of what no built-in effect explains, or the curve, as effects of this model. Empty: there is none.
+// The formula of what no built-in effect explains, or the curve, as effects of this model; of several kinds of
+// measurement the first's. Empty: there is none.
 absl::StatusOr<std::vector<model::EffectInstance>> SuggestedEffects(const model::Model& model,
-                                                                    const v1::Unexplained& rest) {
-  const std::string& yaml = rest.formula_yaml().empty() ? rest.lookup_yaml() : rest.formula_yaml();
+                                                                    const v1::Report& report) {
+  std::string yaml;
+  for (const v1::DataReport& data : report.data()) {
+    const v1::Unexplained& rest = data.unexplained();
+    if (yaml.empty()) yaml = rest.formula_yaml().empty() ? rest.lookup_yaml() : rest.formula_yaml();
+  }
   if (yaml.empty()) return std::vector<model::EffectInstance>();
   const std::string file =
       absl::StrCat("touchstone: model/1\nname: suggested\nend_effector: {fingers: ", model.fingers,
@@ -51,7 +56,7 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
                               model::ParseModel(yaml, "the improved model", effects::Catalogue()));
   bool suggested = false;
   if (options.with_formula) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effects, SuggestedEffects(model, report.unexplained()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effects, SuggestedEffects(model, report));
     suggested = !effects.empty();
     model.effects.insert(model.effects.end(), effects.begin(), effects.end());
     if (!suggested) cli.Log("--with-formula: this report suggests no formula and no curve");

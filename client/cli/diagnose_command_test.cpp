@@ -117,8 +117,8 @@ TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
   const Outcome after =
       Run({"compare", "set.csv", "--model", "better.yaml", "--mesh-dir", "meshes", "--json", "-"});
   ASSERT_EQ(after.exit_code, 0) << after.err;
-  EXPECT_LT(Json::parse(after.out)["initial"]["rmse_us"],
-            0.5 * Json::parse(Read("before.json"))["initial"]["rmse_us"].get<double>());
+  EXPECT_LT(Json::parse(after.out)["data"][0]["initial"]["rmse"],
+            0.5 * Json::parse(Read("before.json"))["data"][0]["initial"]["rmse"].get<double>());
 }
 
 TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
@@ -143,7 +143,7 @@ TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   const Outcome stored = Run({"compare", "monday", "--model", "nominal.yaml", "--mesh-dir", "meshes",
                               "--server", address, "--json", "-"});
   ASSERT_EQ(stored.exit_code, 0) << stored.err;
-  EXPECT_EQ(Json::parse(stored.out)["initial"], Json::parse(here.out)["initial"]);
+  EXPECT_EQ(Json::parse(stored.out)["data"][0]["initial"], Json::parse(here.out)["data"][0]["initial"]);
 }
 
 TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {

@@ -90,19 +90,26 @@ TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
   ASSERT_EQ(report["verdict"], "MISSING_EFFECTS") << report["summary"];
   ASSERT_EQ(report["steps"].size(), 2u) << report["summary"];
   const nlohmann::json pose = StepOf(report, "object_pose"), exposure = StepOf(report, "exposure");
-  EXPECT_EQ(pose["shown_by"], "both");
-  EXPECT_EQ(exposure["shown_by"], "photographs");
+  EXPECT_EQ(pose["shown_by"], nlohmann::json({"TOUCHES", "PHOTOGRAPHS"}));
+  EXPECT_EQ(exposure["shown_by"], nlohmann::json({"PHOTOGRAPHS"}));
   for (const nlohmann::json& value : pose["parameters"]) {
-    EXPECT_LT(value["std_error"].get<double>(), value["std_error_touches"].get<double>());
-    EXPECT_LT(value["std_error"].get<double>(), value["std_error_photographs"].get<double>());
+    ASSERT_EQ(value["alone"].size(), 2u);
+    for (const nlohmann::json& alone : value["alone"])
+      EXPECT_LT(value["std_error"].get<double>(), alone["std_error"].get<double>()) << alone["kind"];
   }
   const nlohmann::json given = Report({"compare", "session", "--model", "nominal.yaml"});
   const nlohmann::json better = Report({"compare", "session", "--model", "better.yaml"});
-  for (const char* rmse : {"rmse_us", "rmse_grey"}) {
-    const double initial = report["initial"][rmse], final = report["final"][rmse];
-    EXPECT_NEAR(initial, given["initial"][rmse].get<double>(), 1e-9 * initial) << rmse;
-    EXPECT_NEAR(final, better["initial"][rmse].get<double>(), 1e-4 * final) << rmse;
-    EXPECT_LT(final, 0.7 * initial) << rmse;
+  ASSERT_EQ(report["data"].size(), 2u);
+  for (size_t kind = 0; kind < 2; ++kind) {
+    const nlohmann::json& data = report["data"][kind];
+    const auto compared = [kind](const nlohmann::json& of) {
+      return of["data"][kind]["initial"]["rmse"].get<double>();
+    };
+    const double initial = data["initial"]["rmse"], final = data["final"]["rmse"];
+    EXPECT_NEAR(initial, compared(given), 1e-9 * initial) << data["unit"];
+    EXPECT_NEAR(final, compared(better), 1e-4 * final) << data["unit"];
+    EXPECT_LT(final, 0.7 * initial) << data["unit"];
+    EXPECT_EQ(data["after_step"].size(), report["steps"].size());
   }
   for (const char* part : {"rendered after", "Touches and pictures", "Touches alone", "photographs alone"})
     EXPECT_THAT(Read("report.html"), HasSubstr(part));

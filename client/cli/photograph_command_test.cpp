@@ -58,16 +58,20 @@ TEST_F(PhotographCommand, EveryErrorOfADiagnosisIsFoundAgainByComparisons) {
                                         "better.yaml", "--html", "report.html"});
   ASSERT_EQ(report["steps"].size(), 1u) << report["summary"];
   EXPECT_EQ(report["steps"][0]["effect"], "exposure");
-  EXPECT_EQ(report["images"], 18);
+  ASSERT_EQ(report["data"].size(), 1u);
+  EXPECT_EQ(report["data"][0]["count"], 18);
+  EXPECT_EQ(report["data"][0]["kind"], "PHOTOGRAPHS");
+  EXPECT_EQ(report["data"][0]["unit"], "grey");
   const nlohmann::json given = Report({"compare", "photos", "--model", "nominal.yaml"});
   const nlohmann::json better = Report({"compare", "photos", "--model", "better.yaml"});
-  const auto rmse = [](const nlohmann::json& of) { return of["rmse_grey"].get<double>(); };
-  EXPECT_NEAR(rmse(report["initial"]), rmse(given["initial"]), 1e-9);
-  EXPECT_NEAR(rmse(report["final"]), rmse(better["initial"]), 1e-4 * rmse(report["final"]));
-  EXPECT_NEAR(rmse(report["steps"][0]), rmse(better["initial"]), 0.01 * rmse(report["final"]));
-  EXPECT_LT(rmse(report["final"]), 0.5 * rmse(report["initial"]));
-  EXPECT_NEAR(report["photographs"]["silhouette_iou_after"].get<double>(),
-              better["photographs"]["silhouette_iou"].get<double>(), 1e-3);
+  const auto rmse = [](const nlohmann::json& of) { return of["rmse"].get<double>(); };
+  const nlohmann::json data = report["data"][0], improved = better["data"][0];
+  EXPECT_NEAR(rmse(data["initial"]), rmse(given["data"][0]["initial"]), 1e-9);
+  EXPECT_NEAR(rmse(data["final"]), rmse(improved["initial"]), 1e-4 * rmse(data["final"]));
+  EXPECT_NEAR(rmse(data["after_step"][0]), rmse(improved["initial"]), 0.01 * rmse(data["final"]));
+  EXPECT_LT(rmse(data["final"]), 0.5 * rmse(data["initial"]));
+  EXPECT_NEAR(data["photographs"]["silhouette_iou_after"].get<double>(),
+              improved["photographs"]["silhouette_iou"].get<double>(), 1e-3);
   // The page carries its pictures and loads nothing.
   const std::string page = Read("report.html");
   EXPECT_THAT(page, HasSubstr("data:image/png;base64,iVBOR"));
@@ -94,7 +98,7 @@ TEST_F(PhotographCommand, WithoutAHiddenEffectNothingIsClaimed) {
   const nlohmann::json report = Report({"diagnose", "photos", "--model", "nominal.yaml"});
   EXPECT_EQ(report["verdict"], "ADEQUATE") << report["summary"];
   EXPECT_TRUE(report["steps"].empty());
-  EXPECT_GT(report["photographs"]["silhouette_iou"].get<double>(), 0.99);
+  EXPECT_GT(report["data"][0]["photographs"]["silhouette_iou"].get<double>(), 0.99);
 }
 
 TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
@@ -131,9 +135,9 @@ TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
     const Outcome fixing = Run(fix);
     ASSERT_EQ(fixing.exit_code, 0) << fixing.err;
     const nlohmann::json fixed = Report({"compare", fix.back(), "--model", "nominal.yaml"});
-    const double promised = problem["rmse_after_grey"], found = fixed["initial"]["rmse_grey"];
+    const double promised = problem["error_after"], found = fixed["data"][0]["initial"]["rmse"];
     EXPECT_NEAR(found, promised, 1e-6 * promised);
-    EXPECT_LT(found, 0.3 * problem["rmse_before_grey"].get<double>());
+    EXPECT_LT(found, 0.3 * problem["error_before"].get<double>());
   }
 }
 
@@ -145,8 +149,11 @@ TEST_F(PhotographCommand, TouchesBesideArePartOfAComparison) {
       0);
   ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "photos/touches.csv"}).exit_code, 0);
   const nlohmann::json compared = Report({"compare", "photos", "--model", "nominal.yaml"});
-  EXPECT_GT(compared["initial"]["rmse_grey"].get<double>(), 0);
-  EXPECT_GE(compared["touches"].get<int>(), 8);
+  ASSERT_EQ(compared["data"].size(), 2u);
+  EXPECT_EQ(compared["data"][0]["kind"], "TOUCHES");
+  EXPECT_GE(compared["data"][0]["count"].get<int>(), 8);
+  EXPECT_EQ(compared["data"][1]["kind"], "PHOTOGRAPHS");
+  EXPECT_GT(compared["data"][1]["initial"]["rmse"].get<double>(), 0);
 }
 
 TEST_F(PhotographCommand, MessagesNameWhatIsWrong) {

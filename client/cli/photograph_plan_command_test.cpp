@@ -55,13 +55,15 @@ TEST_F(PhotographPlanCommand, AProposedPlanCanBePhotographed) {
   EXPECT_THAT(outcome.err, HasSubstr("4 pictures"));
   EXPECT_THAT(outcome.err, HasSubstr("tells focal_error from"));
   const nlohmann::json report = nlohmann::json::parse(Read("next.json"));
-  ASSERT_EQ(report["next_photographs"].size(), 4u);
-  EXPECT_GE(report["next_photographs"][0]["photographs_to_verdict"].get<int>(), 1);
-  EXPECT_GT(report["next_photographs"][0]["separation"].get<double>(), 0);
+  ASSERT_EQ(report["next"].size(), 4u);
+  EXPECT_GE(report["next"][0]["count_to_verdict"].get<int>(), 1);
+  EXPECT_GT(report["next"][0]["separation"].get<double>(), 0);
   // Every effect as the first step, the best one first, with what it alone leaves.
-  ASSERT_GE(report["candidates"].size(), 10u);
-  EXPECT_EQ(report["candidates"][0]["effect"], "focal_error");
-  EXPECT_LT(report["candidates"][0]["rmse_grey"].get<double>(), report["initial"]["rmse_grey"].get<double>());
+  EXPECT_TRUE(report["next"][0].contains("photograph"));
+  const nlohmann::json data = report["data"][0];
+  ASSERT_GE(data["candidates"].size(), 10u);
+  EXPECT_EQ(data["candidates"][0]["effect"], "focal_error");
+  EXPECT_LT(data["candidates"][0]["rmse"].get<double>(), data["initial"]["rmse"].get<double>());
   const auto plan = session::ParseImagesCsv(Read("next.csv"), "next.csv");
   ASSERT_TRUE(plan.ok()) << plan.status();
   ASSERT_EQ(plan->size(), 4u);

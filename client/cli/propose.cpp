@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "client/cli/comparison.h"
+#include "client/report/words.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
@@ -22,16 +23,17 @@ struct ProposeOptions : ComparisonOptions {
 };
 
 // A name that says from where: the same view has the same name in every plan, so that a folder keeps those of several.
-std::string PictureName(const v1::ProposedPhotograph& next) {
-  const v1::Vector3& eye = next.camera().eye_m();
+std::string PictureName(const v1::NextMeasurement& next) {
+  const v1::Vector3& eye = next.photograph().eye_m();
   return absl::StrFormat("%s_from_%.0f_%.0f_%.0f.png", next.object(), FromSi(Unit::kMillimetre, eye.x()),
                          FromSi(Unit::kMillimetre, eye.y()), FromSi(Unit::kMillimetre, eye.z()));
 }
 
-// Proposed pictures as the images.csv that they would have.
+// Proposed pictures as the images.csv that they would have; empty without any.
 std::string PlanOfPhotographs(const v1::Report& report) {
   session::ImageSet plan;
-  for (const v1::ProposedPhotograph& next : report.next_photographs()) {
+  for (const v1::NextMeasurement& next : report.next()) {
+    const v1::CameraPose& camera = next.photograph();
     session::PhotographRow row;
     row.image = plan.photographs.size();
     row.file = PictureName(next);
@@ -41,34 +43,54 @@ std::string PlanOfPhotographs(const v1::Report& report) {
     row.object = static_cast<int>(found - plan.objects.begin());
     if (found == plan.objects.end()) plan.objects.push_back(next.object());
     const auto vector = [](const v1::Vector3& v) { return Eigen::Vector3d(v.x(), v.y(), v.z()); };
-    row.commanded = {vector(next.camera().eye_m()), vector(next.camera().at_m()), vector(next.camera().up())};
+    row.commanded = {vector(camera.eye_m()), vector(camera.at_m()), vector(camera.up())};
     plan.photographs.push_back(std::move(row));
   }
   return session::FormatImagesCsv(plan);
 }
 
-absl::Status WritePlanOfPhotographs(const Cli& cli, const ProposeOptions& options, const v1::Report& report) {
+// Proposed touches as a measurement file without times.
+std::string PlanOfTouches(const v1::Report& report) {
+  std::vector<client::MeasuredTouch> plan;
+  for (const v1::NextMeasurement& next : report.next()) {
+    client::MeasuredTouch touch;
+    touch.touch = plan.size();
+    touch.object = next.object();
+    touch.commanded = next.touch();
+    plan.push_back(std::move(touch));
+  }
+  return client::FormatMeasurements(plan);
+}
+
+// How a plan of one kind is told and written.
+struct PlanKind {
+  const char *one, *many;
+  std::string (*format)(const v1::Report& report);
+};
+
+absl::Status WritePlan(const Cli& cli, const ProposeOptions& options, const PlanKind& kind,
+                       const v1::Report& report) {
   std::map<std::string, int> purposes;
-  for (const v1::ProposedPhotograph& next : report.next_photographs()) ++purposes[next.purpose()];
-  for (const auto& [purpose, pictures] : purposes)
-    cli.Log(absl::StrCat(Counted(pictures, "picture", "pictures"), ": ", purpose));
+  for (const v1::NextMeasurement& next : report.next()) ++purposes[next.purpose()];
+  for (const auto& [purpose, count] : purposes)
+    cli.Log(absl::StrCat(Counted(count, kind.one, kind.many), ": ", purpose));
   if (report.verdict() == v1::Report::TOO_LITTLE_DATA) cli.Log(report.summary());
-  // What no picture can decide needs another measurement.
+  // What no further one can decide needs another measurement.
   for (const v1::Ambiguity& ambiguity : report.ambiguities())
     if (!ambiguity.discriminating_measurement().empty())
       cli.Log(absl::StrCat("to tell ", absl::StrJoin(ambiguity.effects(), " from "), ": ",
                            ambiguity.discriminating_measurement()));
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
-  if (report.next_photographs().empty()) {
+  if (report.next().empty()) {
     cli.Log(report.data_problems().empty()
-                ? "no pictures to propose: no explanations are left that further pictures would tell apart"
-                : "no pictures to propose before the set is fixed: " + report.summary());
+                ? absl::StrCat("no ", kind.many, " to propose: no explanations are left that further ",
+                               kind.many, " would tell apart")
+                : absl::StrCat("no ", kind.many, " to propose before the set is fixed: ", report.summary()));
     return absl::OkStatus();
   }
   if (options.ReportOnStdout() && options.output.empty()) return absl::OkStatus();
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, PlanOfPhotographs(report)));
-  cli.LogWritten(options.output,
-                 absl::StrCat(" (", Counted(report.next_photographs_size(), "picture", "pictures"), ")"));
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, kind.format(report)));
+  cli.LogWritten(options.output, absl::StrCat(" (", Counted(report.next_size(), kind.one, kind.many), ")"));
   return absl::OkStatus();
 }
 
@@ -90,37 +112,15 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
                                 return comparison->connection().diagnosis().Propose(context, request);
                               }));
 
+  const bool pictures = client::MainData(report).kind() == v1::DataReport::PHOTOGRAPHS;
   if (both)
-    cli.Log(report.images() > 0
+    cli.Log(pictures
                 ? "from the photographs alone, without the touches beside them (--touches N proposes touches)"
                 : "from the touches alone, without the photographs beside them");
-  if (report.images() > 0) return WritePlanOfPhotographs(cli, options, report);
-  std::vector<client::MeasuredTouch> plan;
-  std::map<std::string, int> purposes;
-  for (const v1::ProposedTouch& proposed : report.next_touches()) {
-    client::MeasuredTouch touch;
-    touch.touch = plan.size();
-    touch.object = proposed.object();
-    touch.commanded = proposed.touch();
-    plan.push_back(std::move(touch));
-    ++purposes[proposed.purpose()];
-  }
-  for (const auto& [purpose, touches] : purposes)
-    cli.Log(absl::StrCat(Counted(touches, "touch", "touches"), ": ", purpose));
-  // What no touch can decide needs another measurement.
-  for (const v1::Ambiguity& ambiguity : report.ambiguities())
-    if (!ambiguity.discriminating_measurement().empty())
-      cli.Log(absl::StrCat("to tell ", absl::StrJoin(ambiguity.effects(), " from "), ": ",
-                           ambiguity.discriminating_measurement()));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
-  if (plan.empty()) {
-    cli.Log("no touches to propose: no explanations are left that further touches would tell apart");
-    return absl::OkStatus();
-  }
-  if (options.ReportOnStdout() && options.output.empty()) return absl::OkStatus();
-  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, client::FormatMeasurements(plan)));
-  cli.LogWritten(options.output, absl::StrCat(" (", Counted(plan.size(), "touch", "touches"), ")"));
-  return absl::OkStatus();
+  return WritePlan(cli, options,
+                   pictures ? PlanKind{"picture", "pictures", PlanOfPhotographs}
+                            : PlanKind{"touch", "touches", PlanOfTouches},
+                   report);
 }
 
 }  // namespace

@@ -14,7 +14,6 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/service/convert.h"
-#include "server/session/emulated.h"
 
 namespace touchstone::cli {
 namespace {
@@ -191,7 +190,7 @@ class Photos {
   absl::Status TakeAll() {
     TOUCHSTONE_ASSIGN_OR_RETURN(source_, OpenLeased(cli_, rig_.connection.get(), options_.motion));
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState rig, GetRig(rig_.connection.get()));
-    emulated_ = session::NamesAnEmulator(rig.provenance());
+    emulated_ = rig.emulated();
     const StopOnInterrupt stop_on_interrupt(source_.get());
     std::string mounted;
     for (size_t k = 0; k < views_.size(); ++k) {

@@ -55,6 +55,7 @@ absl::StatusOr<std::unique_ptr<RigRecord>> RigRecord::Open(const std::string& pa
   head.created_unix_s =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   head.provenance = rig.provenance();
+  head.emulated = rig.emulated();
   head.calibration = rig.calibration();
   if (rig.fingers() > 0) head.fingers = static_cast<int>(rig.fingers());
   if (rig.spacing_m() > 0) head.spacing_m = rig.spacing_m();

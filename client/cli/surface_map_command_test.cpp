@@ -49,8 +49,9 @@ class SurfaceMapCommandTest : public RealBinaryTest {
     command.insert(command.end(), more.begin(), more.end());
     const Outcome outcome = Run(command);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    return outcome.exit_code == 0 ? Json::parse(Read("compare.json"))["initial"]["rmse_us"].get<double>()
-                                  : -1;
+    return outcome.exit_code == 0
+               ? Json::parse(Read("compare.json"))["data"][0]["initial"]["rmse"].get<double>()
+               : -1;
   }
 };
 
@@ -66,10 +67,10 @@ TEST_F(SurfaceMapCommandTest, IsFoundAppliedSentAndWrittenAsAMesh) {
   EXPECT_EQ(report["steps"][0]["effect"], "surface_map");
 
   // The same touches, other touches, and the same at a server, which has no such file.
-  const double error_us = report["final"]["rmse_us"];
+  const double error_us = report["data"][0]["final"]["rmse"];
   EXPECT_NEAR(Rmse("set.csv", "better.yaml"), error_us, 0.01 * error_us);
   MakeBumpySet("other.csv", "9");
-  const double unseen_us = report["final"]["heldout_rmse_us"];
+  const double unseen_us = report["data"][0]["final"]["heldout_rmse"];
   const double other_us = Rmse("other.csv", "better.yaml");
   EXPECT_LT(other_us, 1.5 * unseen_us);
   EXPECT_GT(other_us, unseen_us / 1.5);

@@ -6,26 +6,36 @@
 #include <absl/strings/str_cat.h>
 
 namespace touchstone::client {
-namespace {
 
-// Three figures, but never finer than a hundredth of a grey level.
-std::string GreyNumber(double grey) {
-  const double size = std::abs(grey);
-  return std::isnan(grey) ? "n/a" : Fixed(grey, size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
+// Three figures of grey levels, but never finer than a hundredth of one; three of pixels.
+std::string ErrorScale::Plain(double error) const {
+  const double size = std::abs(error);
+  if (std::isnan(error)) return "n/a";
+  return kind_ == v1::DataReport::BOARDS ? Number(error)
+                                         : Fixed(error, size < 9.995   ? 2
+                                                        : size < 99.95 ? 1
+                                                                       : 0);
 }
 
-}  // namespace
+const char* ErrorScale::Symbol() const {
+  return kind_ == v1::DataReport::BOARDS ? "px" : "grey";
+}
 
 std::string ErrorScale::Text(double error) const {
-  return grey_ ? absl::StrCat(GreyNumber(error), " grey") : Time(error);
+  return IsTime() ? Time(error) : absl::StrCat(Plain(error), " ", Symbol());
 }
 
 std::string ErrorScale::Signed(double error) const {
-  return grey_ ? absl::StrCat(error > 0 ? "+" : "", GreyNumber(error), " grey") : SignedTime(error);
+  return IsTime() ? SignedTime(error) : absl::StrCat(error > 0 ? "+" : "", Plain(error), " ", Symbol());
 }
 
 std::string ErrorScale::Change(double from, double to) const {
-  return grey_ ? absl::StrCat(GreyNumber(from), " -> ", GreyNumber(to), " grey") : TimeChange(from, to);
+  return IsTime() ? TimeChange(from, to) : absl::StrCat(Plain(from), " -> ", Plain(to), " ", Symbol());
+}
+
+TimeUnit ErrorScale::UnitFor(double size) const {
+  if (IsTime()) return UnitOfTime(size);
+  return {1, kind_ == v1::DataReport::BOARDS ? "px" : "grey levels"};
 }
 
 }  // namespace touchstone::client

@@ -33,35 +33,36 @@ bool FallsAtAll(const ErrorScale& scale, double from, double to) {
 
 // What repeats show comes before what distributions hide.
 std::string FoundInRepeats(const v1::DistributionComparison& comparison) {
-  static const std::map<std::string, const char*> kKinds = {
-      {"session", "repeats change with their place in the session"},
-      {"previous_press", "repeats depend on the previous touch"},
-      {"tails", "repeats scatter with tails"},
-      {"ticks", "all times sit on ticks"}};
+  static const std::map<v1::RepeatFinding::Kind, const char*> kKinds = {
+      {v1::RepeatFinding::SESSION, "repeats change with their place in the session"},
+      {v1::RepeatFinding::PREVIOUS_PRESS, "repeats depend on the previous touch"},
+      {v1::RepeatFinding::TAILS, "repeats scatter with tails"},
+      {v1::RepeatFinding::TICKS, "all times sit on ticks"}};
   std::vector<std::string> found;
   for (const v1::RepeatFinding& finding : comparison.findings()) {
     const auto kind = kKinds.find(finding.kind());
-    found.push_back(absl::StrCat(kind == kKinds.end() ? finding.kind() : kind->second, " (p ",
+    found.push_back(absl::StrCat(kind == kKinds.end() ? finding.words() : kind->second, " (p ",
                                  Probability(finding.p()), ")"));
   }
   return absl::StrCat("The model lacks something that shows without poses: ", Join(found, "and"), ".");
 }
 
 std::string Compared(const v1::Report& report) {
-  if (report.has_distributions()) {
+  const v1::DataReport& data = MainData(report);
+  if (data.has_distributions()) {
     // Of all measures together, where the report has it.
-    const double p = report.has_initial() ? report.initial().lack_of_fit_p() : report.distributions().p();
-    if (!report.distributions().findings().empty()) return FoundInRepeats(report.distributions());
+    const double p = data.has_initial() ? data.initial().lack_of_fit_p() : data.distributions().p();
+    if (!data.distributions().findings().empty()) return FoundInRepeats(data.distributions());
     const std::string lacks =
         report.steps().empty() ? "M" : absl::StrCat("The model lacks ", Steps(report), "; with it, m");
     return absl::StrCat(lacks, "easured and simulated touches ",
                         p < 0.01 ? "differ as distributions" : "cannot be told apart as distributions",
                         " (p ", p < 1e-15 ? "" : "= ", Probability(p), ").");
   }
-  const ErrorScale scale(report);
-  const double rmse = scale.Rmse(report.initial());
+  const ErrorScale scale(data);
+  const double rmse = data.initial().rmse();
   if (!(rmse > 0)) return "Nothing could be compared.";
-  const Floor floor = NoiseFloorOf(report);
+  const Floor floor = NoiseFloorOf(data);
   if (!(floor.sigma > 0)) return absl::StrCat("The model is off by ", scale.Text(rmse), ".");
   return absl::StrCat("The model is off by ", scale.Text(rmse), ", ", Number(rmse / floor.sigma, 2),
                       " times the noise floor.");
@@ -69,9 +70,9 @@ std::string Compared(const v1::Report& report) {
 
 std::string Unexplained(const v1::Report& report) {
   std::string on;
-  if (!report.unexplained().covariates().empty()) {
-    on = absl::StrCat(" It depends on ", CovariateName(report.unexplained().covariates(0).name()), ".");
-  }
+  for (const v1::DataReport& data : report.data())
+    if (on.empty() && !data.unexplained().covariates().empty())
+      on = absl::StrCat(" It depends on ", CovariateName(data.unexplained().covariates(0).name()), ".");
   if (report.steps().empty()) {
     return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
   }
@@ -83,24 +84,24 @@ std::string CheckData(const v1::Report& report) {
   if (report.data_problems().empty()) return "Check the data: the file has a mistake.";
   const v1::DataProblem& problem = report.data_problems(0);
   const std::string what = absl::StrCat("Check the data before the model: ", ProblemTitle(problem));
-  const ErrorScale scale(report);
-  const double before = scale.Before(problem), after = scale.After(problem);
+  const ErrorScale scale(DataOf(report, problem));
+  const double before = problem.error_before(), after = problem.error_after();
   if (!(after > 0) || !(after < before)) return absl::StrCat(what, ".");
   return absl::StrCat(what, "; fixed, ", Falls(scale, before, after), ".");
 }
 
 std::string TooLittle(const v1::Report& report) {
-  const ErrorScale scale(report);
-  const uint32_t used = scale.Readings(report);
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  const uint32_t used = data.count();
   // A picture that is taken again shows noise and nothing else: photographs are counted by pose.
-  std::string needed = absl::StrCat(Count(report.touches_needed()), " usable touches would do.");
-  if (scale.grey())
-    needed = absl::StrCat("usable pictures from ", Count(report.touches_needed()), " poses would do.");
-  if (scale.grey() && report.touches() > 0) needed = "the summary says which kind needs more.";
+  std::string needed = absl::StrCat(Count(data.needed()), " usable touches would do.");
+  if (scale.pictures())
+    needed = absl::StrCat("usable pictures from ", Count(data.needed()), " poses would do.");
+  if (report.data_size() > 1) needed = "the summary says which kind needs more.";
   if (used == 0)
     return absl::StrCat("No ", scale.one_reading(), " could be used, so nothing can be said; ", needed);
-  return absl::StrCat("Too little data for a verdict: ", Count(used), " ",
-                      used == 1 ? scale.one_reading() : scale.readings(), "; ", needed);
+  return absl::StrCat("Too little data for a verdict: ", Count(used), " ", scale.Counted(used), "; ", needed);
 }
 
 std::string WrongValues(const v1::Report& report) {
@@ -115,8 +116,9 @@ std::string WrongValues(const v1::Report& report) {
     absl::StrAppend(&what, names.empty() ? ", but " : ", and ", "the data do without ",
                     Join(superfluous, "and"));
   if (names.empty() && superfluous.empty()) what += ", but the noise is not what the model says";
-  const ErrorScale scale(report);
-  const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  const double from = data.initial().rmse(), to = data.final().rmse();
   if (IsJoint(report) && !FallsOfBoth(report).empty())
     return absl::StrCat(what, ": put right, the error ", FallsOfBoth(report), ".");
   return absl::StrCat(
@@ -124,24 +126,27 @@ std::string WrongValues(const v1::Report& report) {
 }
 
 std::string MissingEffects(const v1::Report& report) {
-  const ErrorScale scale(report);
-  const double from = scale.Rmse(report.initial()), to = scale.Rmse(report.final());
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  const double from = data.initial().rmse(), to = data.final().rmse();
   const std::string lacks = absl::StrCat("The model lacks ", Steps(report), "; ");
   // A map of the surface is made from these very touches: what it does for others is what it is worth.
   const bool maps = std::any_of(report.steps().begin(), report.steps().end(),
                                 [](const v1::Step& step) { return step.effect() == "surface_map"; });
   if (maps) {
-    const double unseen = report.final().heldout_rmse_us();
+    const v1::DataReport& touches = report.data(0);
+    const ErrorScale time(touches);
+    const double given = touches.initial().rmse(), unseen = touches.final().heldout_rmse();
     return absl::StrCat(
         lacks, "on unseen touches the error ",
-        FallsAtAll(scale, from, unseen) ? absl::StrCat("falls from ", Time(from), " to ") : "stays ",
-        Time(unseen), ".");
+        FallsAtAll(time, given, unseen) ? absl::StrCat("falls from ", time.Text(given), " to ") : "stays ",
+        time.Text(unseen), ".");
   }
   if (IsJoint(report) && !FallsOfBoth(report).empty())
     return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", "the error ",
                         FallsOfBoth(report), ".");
   if (!FallsAtAll(scale, from, to)) return absl::StrCat(lacks, "the error stays ", scale.Text(to), ".");
-  const Floor floor = NoiseFloorOf(report);
+  const Floor floor = NoiseFloorOf(data);
   const bool reached = floor.sigma > 0 && to <= 1.05 * floor.sigma;
   return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(scale, from, to),
                       reached ? ", the noise floor." : ".");
@@ -151,15 +156,14 @@ std::string MissingEffects(const v1::Report& report) {
 
 std::string Headline(const v1::Report& report) {
   const std::string model = report.model_name().empty() ? "the model" : report.model_name();
-  if (report.has_distributions()) return Compared(report);
+  if (MainData(report).has_distributions()) return Compared(report);
   switch (report.verdict()) {
     case v1::Report::ADEQUATE:
-      if (report.has_finger_scatter())
+      if (!FingerScatterWords(report).empty())
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
-      return absl::StrCat("Nothing is missing: ", model, " is as good as ",
-                          Count(ErrorScale(report).Readings(report)), " ", ErrorScale(report).readings(),
-                          " can tell.");
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(MainData(report).count()),
+                          " ", ErrorScale(MainData(report)).readings(), " can tell.");
     case v1::Report::WRONG_VALUES:
       return WrongValues(report);
     case v1::Report::MISSING_EFFECTS:

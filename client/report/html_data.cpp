@@ -16,16 +16,15 @@ std::string Term(const char* term, const std::string& text) {
   return text.empty() ? "" : absl::StrCat("<dt>", term, "</dt><dd>", Typeset(text), "</dd>");
 }
 
-std::string Floors(const v1::Report& report) {
-  const Floor floor = NoiseFloorOf(report);
+std::string Floors(const v1::DataReport& data) {
+  const Floor floor = NoiseFloorOf(data);
   if (!(floor.sigma > 0)) return "";
-  const ErrorScale scale(report);
+  const ErrorScale scale(data);
   std::string text = absl::StrCat(floor.bound ? "at most " : "", scale.Text(floor.sigma));
-  const v1::NoiseFloor& detail = report.noise_floor();
-  const double lower = scale.grey() ? detail.lower_grey() : detail.lower_us();
-  const double upper = scale.grey() ? detail.upper_grey() : detail.upper_us();
-  if (lower > 0 && lower < upper)
-    absl::StrAppend(&text, ", 95 % interval ", scale.Text(lower), " to ", scale.Text(upper));
+  const v1::NoiseFloor& detail = data.noise();
+  if (detail.lower() > 0 && detail.lower() < detail.upper())
+    absl::StrAppend(&text, ", 95 % interval ", scale.Text(detail.lower()), " to ",
+                    scale.Text(detail.upper()));
   absl::StrAppend(&text,
                   floor.bound ? ", from the best model\u2019s residuals" : ", from repeats of the same ",
                   floor.bound ? "" : scale.one_reading());
@@ -35,35 +34,30 @@ std::string Floors(const v1::Report& report) {
   return text;
 }
 
-std::string Summary(const v1::Report& report) {
-  const v1::DataSummary& data = report.data();
-  std::vector<std::string> objects(data.objects().begin(), data.objects().end()), speeds, fingers;
-  for (const double speed : data.speeds_mm_s()) speeds.push_back(Tick(speed));
-  for (int i = 0; i < report.finger_bias_us_size(); ++i) {
-    fingers.push_back(absl::StrCat(FingerName(report, i), " ", SignedTime(report.finger_bias_us(i))));
-  }
+std::string Summary(const v1::DataReport& data) {
+  const v1::DataSummary& set = data.set();
+  const std::vector<std::string> objects(set.objects().begin(), set.objects().end());
+  std::vector<std::string> speeds;
+  for (const double speed : set.speeds_mm_s()) speeds.push_back(Tick(speed));
+  const ErrorScale scale(data);
   std::string terms;
-  if (data.rows() > 0) {
+  if (set.rows() > 0)
     terms += Term("Rows in the file",
-                  absl::StrCat(Count(data.rows()), ", of which ",
-                               Count(report.touches() > 0 ? report.touches() : report.images()), " used"));
-  }
+                  absl::StrCat(Count(set.rows()), ", of which ", Count(data.count()), " used"));
   terms += Term("Objects", absl::StrJoin(objects, ", "));
   terms += Term("Speeds", speeds.empty() ? "" : absl::StrCat(absl::StrJoin(speeds, ", "), " mm/s"));
-  terms +=
-      Term(ErrorScale(report).grey() ? "Noise floor per pixel" : "Noise floor per finger", Floors(report));
-  terms += Term("Mean residual of each finger", absl::StrJoin(fingers, ", "));
-  if (data.missed_contacts() > 0)
-    terms += Term("Fingers that reported nothing", Count(data.missed_contacts()));
-  if (data.outliers() > 0) terms += Term("Outliers", Count(data.outliers()));
+  terms += Term(scale.pictures() ? "Noise floor per pixel" : "Noise floor per finger", Floors(data));
+  terms += Term("Mean residual of each finger", FingerBiasWords(data));
+  if (set.missed_contacts() > 0) terms += Term("Fingers that reported nothing", Count(set.missed_contacts()));
+  if (data.set_aside().outliers() > 0) terms += Term("Outliers", Count(data.set_aside().outliers()));
   return terms.empty() ? "" : absl::StrCat("<dl>", terms, "</dl>\n");
 }
 
-std::string Unused(const v1::Report& report) {
-  if (report.data().unused().empty()) return "";
+std::string Unused(const v1::DataReport& data) {
+  if (data.set_aside().rows().empty()) return "";
   std::string table = absl::StrCat("<h3>Rows not used</h3>\n<div class=\"scroll\"><table>",
                                    HeaderRow({">Rows", "Why", "Touch numbers"}), "<tbody>");
-  for (const v1::UnusedRows& unused : report.data().unused()) {
+  for (const v1::UnusedRows& unused : data.set_aside().rows()) {
     absl::StrAppend(
         &table, "<tr>", NumberCell(Count(unused.rows())), Cell(Typeset(unused.reason())),
         Cell(absl::StrCat(absl::StrJoin(unused.examples(), ", "),
@@ -73,20 +67,20 @@ std::string Unused(const v1::Report& report) {
   return table + "</tbody></table></div>\n";
 }
 
-std::string WorstTouches(const v1::Report& report) {
-  if (report.worst_touches().empty()) return "";
+std::string WorstTouches(const v1::DataReport& data) {
+  if (data.worst_touches().empty()) return "";
+  const ErrorScale scale(data);
   std::vector<std::string> titles = {">Touch", "Object", ">Size"};
   int fingers = 0;
-  for (const v1::TouchError& touch : report.worst_touches())
-    fingers = std::max(fingers, touch.residual_us_size());
-  for (int i = 0; i < fingers; ++i) titles.push_back(absl::StrCat(">finger ", FingerName(report, i)));
+  for (const v1::TouchError& touch : data.worst_touches()) fingers = std::max(fingers, touch.residual_size());
+  for (int i = 0; i < fingers; ++i) titles.push_back(absl::StrCat(">finger ", FingerName(data, i)));
   std::string table = absl::StrCat("<div class=\"scroll\"><table>", HeaderRow(titles), "<tbody>");
-  for (const v1::TouchError& touch : report.worst_touches()) {
+  for (const v1::TouchError& touch : data.worst_touches()) {
     absl::StrAppend(&table, "<tr>", NumberCell(absl::StrCat(touch.touch())), Cell(Escape(touch.object())),
-                    NumberCell(Time(touch.norm_us())));
+                    NumberCell(scale.Text(touch.norm())));
     for (int i = 0; i < fingers; ++i) {
-      const double residual = i < touch.residual_us_size() ? touch.residual_us(i) : std::nan("");
-      table += std::isnan(residual) ? Cell("none", "num dim") : NumberCell(SignedTime(residual));
+      const double residual = i < touch.residual_size() ? touch.residual(i) : std::nan("");
+      table += std::isnan(residual) ? Cell("none", "num dim") : NumberCell(scale.Signed(residual));
     }
     table += "</tr>\n";
   }
@@ -99,12 +93,16 @@ std::string WorstTouches(const v1::Report& report) {
 }  // namespace
 
 std::string HtmlData(const v1::Report& report) {
-  return Section("data", "The data", "", absl::StrCat(Summary(report), Unused(report), WorstTouches(report)));
+  const std::string body = PerKind(report, [&](const v1::DataReport& data) {
+    return absl::StrCat(Summary(data), Unused(data), WorstTouches(data));
+  });
+  return Section("data", "The data", "", body);
 }
 
 std::string HtmlMethods(const v1::Report& report) {
-  if (report.images() > 0) return HtmlPhotographMethods(report);
-  if (!(report.initial().rmse_us() > 0)) return "";
+  const v1::DataReport& data = MainData(report);
+  if (data.kind() == v1::DataReport::PHOTOGRAPHS) return HtmlPhotographMethods(report);
+  if (!(data.initial().rmse() > 0)) return "";
   return Section(
       "methods", "How the numbers were computed", "",
       "<dl><dt>Residual</dt><dd>Measured minus simulated contact times of the same commanded touch, less the "

@@ -13,15 +13,14 @@ namespace {
 
 constexpr int kMaxParityPoints = 6000;
 
-std::string Parity(const v1::Report& report) {
-  if (report.parity().empty()) return "";
-  const int step = 1 + report.parity_size() / kMaxParityPoints;
-  const bool improved = !report.improved_model_yaml().empty();
+std::string Parity(const v1::DataReport& data, bool improved) {
+  if (data.parity().empty()) return "";
+  const int step = 1 + data.parity_size() / kMaxParityPoints;
   RangeFinder finder;
-  for (int i = 0; i < report.parity_size(); i += step) {
-    finder.Add(report.parity(i).simulated_us());
-    finder.Add(report.parity(i).measured_us());
-    if (improved) finder.Add(report.parity(i).improved_us());
+  for (int i = 0; i < data.parity_size(); i += step) {
+    finder.Add(data.parity(i).simulated());
+    finder.Add(data.parity(i).measured());
+    if (improved) finder.Add(data.parity(i).improved());
   }
   const Range us = finder.Get();
   const TimeUnit unit = UnitOfTime(std::max(std::abs(us.low), std::abs(us.high)));
@@ -33,10 +32,10 @@ std::string Parity(const v1::Report& report) {
                 {absl::StrCat("simulated (", unit.symbol, ")"), range},
                 {absl::StrCat("measured (", unit.symbol, ")"), range});
     std::vector<ChartPoint> points;
-    for (int i = 0; i < report.parity_size(); i += step) {
-      const v1::ParityPoint& point = report.parity(i);
-      points.push_back({(after ? point.improved_us() : point.simulated_us()) * unit.per_us,
-                        point.measured_us() * unit.per_us});
+    for (int i = 0; i < data.parity_size(); i += step) {
+      const v1::ParityPoint& point = data.parity(i);
+      points.push_back(
+          {(after ? point.improved() : point.simulated()) * unit.per_us, point.measured() * unit.per_us});
     }
     chart.Dots(points, after ? "better" : "given");
     chart.Line({{range.low, range.low}, {range.high, range.high}}, "ideal");
@@ -49,23 +48,19 @@ std::string Parity(const v1::Report& report) {
       "<h3>Parity</h3>\n<div class=\"grid wide\">", pair,
       "</div>\n<p class=\"note\">One dot per finger and touch: contact times of a touch, relative to each "
       "other. On the dashed line, measured and simulated agree. ",
-      Count((report.parity_size() + step - 1) / step), " of ", Count(report.parity_size()), " drawn.</p>\n");
+      Count((data.parity_size() + step - 1) / step), " of ", Count(data.parity_size()), " drawn.</p>\n");
 }
 
-std::string Title(const std::string& quantity) {
-  if (quantity == "descriptor_us") return "Descriptor";
-  return quantity == "curvature_per_m" ? "Local curvature" : quantity;
+std::string Title(v1::Histogram::Quantity quantity) {
+  return quantity == v1::Histogram::CURVATURE_PER_M ? "Local curvature" : "Descriptor";
 }
 
 // "descriptor (us)" and the factor that brings it into the unit for people.
 std::pair<std::string, double> Quantity(const v1::Histogram& histogram) {
   const double size = std::max(std::abs(*histogram.edges().begin()), std::abs(*histogram.edges().rbegin()));
-  if (histogram.quantity() == "descriptor_us") {
-    const TimeUnit unit = UnitOfTime(size);
-    return {absl::StrCat("descriptor (", unit.symbol, ")"), unit.per_us};
-  }
-  if (histogram.quantity() == "curvature_per_m") return {"local curvature (1/m)", 1};
-  return {histogram.quantity(), 1};
+  if (histogram.quantity() == v1::Histogram::CURVATURE_PER_M) return {"local curvature (1/m)", 1};
+  const TimeUnit unit = UnitOfTime(size);
+  return {absl::StrCat("descriptor (", unit.symbol, ")"), unit.per_us};
 }
 
 std::string HistogramChart(const v1::Histogram& histogram, bool improved) {
@@ -102,19 +97,18 @@ std::string HistogramChart(const v1::Histogram& histogram, bool improved) {
                 Typeset(caption));
 }
 
-std::string Histograms(const v1::Report& report) {
+std::string Histograms(const v1::DataReport& data, bool improved) {
   std::string grids;
-  const bool improved = !report.improved_model_yaml().empty();
   // A row of pictures for each quantity: all objects first, then each.
-  std::vector<std::string> quantities;
-  for (const v1::Histogram& histogram : report.histograms()) {
+  std::vector<v1::Histogram::Quantity> quantities;
+  for (const v1::Histogram& histogram : data.histograms()) {
     if (std::find(quantities.begin(), quantities.end(), histogram.quantity()) == quantities.end()) {
       quantities.push_back(histogram.quantity());
     }
   }
-  for (const std::string& quantity : quantities) {
+  for (const v1::Histogram::Quantity quantity : quantities) {
     std::string grid;
-    for (const v1::Histogram& histogram : report.histograms()) {
+    for (const v1::Histogram& histogram : data.histograms()) {
       if (histogram.quantity() == quantity) grid += HistogramChart(histogram, improved);
     }
     if (!grid.empty())
@@ -136,7 +130,10 @@ std::string Histograms(const v1::Report& report) {
 }  // namespace
 
 std::string HtmlFit(const v1::Report& report) {
-  return Section("fit", "Measured against simulated", "", absl::StrCat(Parity(report), Histograms(report)));
+  const bool improved = !report.improved_model_yaml().empty();
+  return Section("fit", "Measured against simulated", "", PerKind(report, [&](const v1::DataReport& data) {
+                   return absl::StrCat(Parity(data, improved), Histograms(data, improved));
+                 }));
 }
 
 }  // namespace touchstone::client

@@ -50,11 +50,17 @@ std::string Arrow(const ObjectPicture& picture, const View& view, const v1::Comm
                       std::lround(from.y - 20 * dy / size + 8), "\">", number, "</text>");
 }
 
-std::string Pictures(const v1::Report& report) {
+using NextTouches = std::vector<const v1::NextMeasurement*>;
+
+std::string Pictures(const v1::Report& report, const NextTouches& next) {
   std::map<std::string, std::vector<int>> touches;
-  for (int i = 0; i < report.next_touches_size(); ++i) touches[report.next_touches(i).object()].push_back(i);
+  for (int i = 0; i < static_cast<int>(next.size()); ++i) touches[next[i]->object()].push_back(i);
   std::string grid;
-  for (const v1::ObjectOutline& outline : report.outlines()) {
+  std::vector<const v1::ObjectOutline*> outlines;
+  for (const v1::DataReport& data : report.data())
+    for (const v1::ObjectOutline& outline : data.outlines()) outlines.push_back(&outline);
+  for (const v1::ObjectOutline* one : outlines) {
+    const v1::ObjectOutline& outline = *one;
     const auto found = touches.find(outline.object());
     if (found == touches.end()) continue;
     const ObjectPicture picture(outline, {});
@@ -62,7 +68,7 @@ std::string Pictures(const v1::Report& report) {
       const View view = back ? kBackView : kFrontView;
       std::string arrows;
       for (const int i : found->second) {
-        const v1::CommandedTouch& touch = report.next_touches(i).touch();
+        const v1::CommandedTouch& touch = next[i]->touch();
         // From the side on which the finger can be seen to come in.
         if (Dot(Of(touch.approach(), 1), Towards(view)) < 0) arrows += Arrow(picture, view, touch, i + 1);
       }
@@ -86,17 +92,20 @@ std::string Direction(const v1::Vector3& v) {
 }  // namespace
 
 std::string HtmlNextTouches(const v1::Report& report) {
-  if (report.next_touches().empty()) return "";
+  NextTouches touches;
+  for (const v1::NextMeasurement& next : report.next())
+    if (next.has_touch()) touches.push_back(&next);
+  if (touches.empty()) return "";
   // A purpose that all share is said once.
-  const std::string& first = report.next_touches(0).purpose();
-  const bool one_purpose = std::all_of(report.next_touches().begin(), report.next_touches().end(),
-                                       [&](const auto& next) { return next.purpose() == first; });
+  const std::string& first = touches[0]->purpose();
+  const bool one_purpose =
+      std::all_of(touches.begin(), touches.end(), [&](const auto* next) { return next->purpose() == first; });
   std::vector<std::string> titles = {">No.",      "Object",        ">Target x y z (mm)",
                                      ">Approach", ">Speed (mm/s)", ">Apart (sigmas)"};
   if (!one_purpose) titles.push_back("What it is for");
   std::string table = absl::StrCat("<div class=\"scroll\"><table>", HeaderRow(titles), "<tbody>");
-  for (int i = 0; i < report.next_touches_size(); ++i) {
-    const v1::ProposedTouch& next = report.next_touches(i);
+  for (size_t i = 0; i < touches.size(); ++i) {
+    const v1::NextMeasurement& next = *touches[i];
     const v1::Vector3& t = next.touch().target_m();
     absl::StrAppend(&table, "<tr>", NumberCell(absl::StrCat(i + 1)), Cell(Escape(next.object())),
                     NumberCell(absl::StrCat(Fixed(1000 * t.x(), 1), " ", Fixed(1000 * t.y(), 1), " ",
@@ -108,9 +117,9 @@ std::string HtmlNextTouches(const v1::Report& report) {
   }
   // Each purpose with what it takes.
   std::map<std::string, std::string> verdicts;
-  for (const v1::ProposedTouch& next : report.next_touches()) {
-    const std::string verdict = VerdictTouches(next);
-    if (!verdict.empty()) verdicts.emplace(next.purpose(), verdict);
+  for (const v1::NextMeasurement* next : touches) {
+    const std::string verdict = CountToVerdict(*next);
+    if (!verdict.empty()) verdicts.emplace(next->purpose(), verdict);
   }
   std::string needed;
   for (const auto& [purpose, verdict] : verdicts)
@@ -122,7 +131,7 @@ std::string HtmlNextTouches(const v1::Report& report) {
       one_purpose && !first.empty() ? absl::StrCat("What they are for: ", Typeset(first), ".")
                                     : "Touches that would discriminate between the remaining explanations.",
       absl::StrCat(
-          needed, Pictures(report),
+          needed, Pictures(report, touches),
           Figure(absl::StrCat(table, "</tbody></table></div>"),
                  "Arrows end where the middle finger should meet the surface; the bar at the tail lies "
                  "along the row of fingers. Apart: the expected difference between the explanations, in "
@@ -132,8 +141,8 @@ std::string HtmlNextTouches(const v1::Report& report) {
 }
 
 std::string HtmlDistributions(const v1::Report& report) {
-  if (!report.has_distributions()) return "";
-  const v1::DistributionComparison& comparison = report.distributions();
+  if (!MainData(report).has_distributions()) return "";
+  const v1::DistributionComparison& comparison = MainData(report).distributions();
   std::string body = absl::StrCat(
       "<p>Energy distance ", Typeset(Number(comparison.energy_distance())), ", p ",
       Typeset(Probability(comparison.p())), ", against ", Typeset(Count(comparison.simulated_touches())),

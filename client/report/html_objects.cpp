@@ -25,15 +25,15 @@ struct Object {
   std::vector<const v1::SurfacePoint*> points;
 };
 
-std::map<std::string, Object> Objects(const v1::Report& report, std::vector<std::string>* order) {
+std::map<std::string, Object> Objects(const v1::DataReport& touches, std::vector<std::string>* order) {
   std::map<std::string, Object> objects;
-  const size_t step = 1 + report.surface_points_size() / kMaxSurfacePoints;
-  for (const v1::ObjectOutline& outline : report.outlines()) {
+  const size_t step = 1 + touches.surface_points_size() / kMaxSurfacePoints;
+  for (const v1::ObjectOutline& outline : touches.outlines()) {
     if (objects.count(outline.object()) == 0) order->push_back(outline.object());
     objects[outline.object()].outline = &outline;
   }
-  for (int i = 0; i < report.surface_points_size(); i += step) {
-    const v1::SurfacePoint& point = report.surface_points(i);
+  for (int i = 0; i < touches.surface_points_size(); i += step) {
+    const v1::SurfacePoint& point = touches.surface_points(i);
     if (!std::isfinite(point.x_mm() + point.y_mm() + point.z_mm())) continue;
     if (objects.count(point.object()) == 0) order->push_back(point.object());
     objects[point.object()].points.push_back(&point);
@@ -43,10 +43,10 @@ std::map<std::string, Object> Objects(const v1::Report& report, std::vector<std:
 
 // Half the width of the colour scale: 98 % of the residuals before lie within; the seven colours begin at
 // round numbers.
-double ColourLimit(const v1::Report& report) {
+double ColourLimit(const v1::DataReport& touches) {
   std::vector<double> sizes;
-  for (const v1::SurfacePoint& point : report.surface_points()) {
-    if (std::isfinite(point.residual_us())) sizes.push_back(std::abs(point.residual_us()));
+  for (const v1::SurfacePoint& point : touches.surface_points()) {
+    if (std::isfinite(point.residual())) sizes.push_back(std::abs(point.residual()));
   }
   if (sizes.empty()) return 1;
   const size_t rank = sizes.size() * 98 / 100;
@@ -89,7 +89,7 @@ std::string Dots(const ObjectPicture& picture, const View& view, const Object& o
   const long width = std::lround(std::clamp(9 * std::sqrt(500.0 / (1 + object.points.size())), 8.0, 16.0));
   std::string paths[kColours], out;
   for (const v1::SurfacePoint* point : object.points) {
-    const double residual = after ? point->after_us() : point->residual_us();
+    const double residual = after ? point->after() : point->residual();
     const Vector at = {point->x_mm(), point->y_mm(), point->z_mm()};
     if (!std::isfinite(residual) || !picture.Visible(view, at)) continue;
     const ObjectPicture::Projected p = picture.Project(view, at);
@@ -135,13 +135,13 @@ std::string Stills(const std::string& name, const Object& object, int number, bo
 }
 
 // What the script turns: whole tenths of millimetres and whole microseconds keep it small.
-std::string Data(const v1::Report& report, const std::map<std::string, Object>& objects,
+std::string Data(const v1::DataReport& touches, const std::map<std::string, Object>& objects,
                  const std::vector<std::string>& order, double limit_us, bool improved) {
   nlohmann::json data = {
       {"limit_us", limit_us}, {"improved", improved}, {"fingers", nlohmann::json::array()}};
   data["unit"] = UnitOfTime(limit_us).symbol;
   data["per_us"] = UnitOfTime(limit_us).per_us;
-  for (const std::string& finger : report.fingers()) data["fingers"].push_back(finger);
+  for (const std::string& finger : touches.fingers()) data["fingers"].push_back(finger);
   const auto whole = [](double value) { return std::isfinite(value) ? std::lround(value) : 0L; };
   for (const std::string& name : order) {
     const Object& object = objects.at(name);
@@ -158,8 +158,8 @@ std::string Data(const v1::Report& report, const std::map<std::string, Object>& 
     }
     for (const v1::SurfacePoint* point : object.points) {
       for (const double x : {point->x_mm(), point->y_mm(), point->z_mm()}) one["p"].push_back(whole(10 * x));
-      one["r"].push_back(whole(point->residual_us()));
-      one["a"].push_back(whole(point->after_us()));
+      one["r"].push_back(whole(point->residual()));
+      one["a"].push_back(whole(point->after()));
       one["f"].push_back(point->finger());
     }
     data["objects"].push_back(std::move(one));
@@ -173,10 +173,13 @@ std::string Data(const v1::Report& report, const std::map<std::string, Object>& 
 }  // namespace
 
 std::string HtmlObjects(const v1::Report& report) {
-  if (report.surface_points().empty()) return "";
+  const auto found = std::find_if(report.data().begin(), report.data().end(),
+                                  [](const v1::DataReport& data) { return data.surface_points_size() > 0; });
+  if (found == report.data().end()) return "";
+  const v1::DataReport& touches = *found;
   std::vector<std::string> order;
-  const std::map<std::string, Object> objects = Objects(report, &order);
-  const double limit_us = ColourLimit(report);
+  const std::map<std::string, Object> objects = Objects(touches, &order);
+  const double limit_us = ColourLimit(touches);
   const bool improved = !report.improved_model_yaml().empty();
   size_t shown = 0;
   for (const auto& [name, object] : objects) shown += object.points.size();
@@ -199,11 +202,11 @@ std::string HtmlObjects(const v1::Report& report) {
       "<p class=\"note\">Each dot is one finger\u2019s contact, at the point where the given "
       "model puts it, coloured by its residual. Front: seen from the front and above; back: from behind and "
       "below. ",
-      Count(shown), " of ", Count(report.surface_points_size()), " contacts are drawn");
+      Count(shown), " of ", Count(touches.surface_points_size()), " contacts are drawn");
   if (order.size() > kMaxObjects)
     absl::StrAppend(&body, ", stills of the first ", kMaxObjects, " objects only");
   absl::StrAppend(&body, ".</p>\n<script type=\"application/json\" id=\"objects-data\">",
-                  Data(report, objects, order, limit_us, improved), "</script>\n");
+                  Data(touches, objects, order, limit_us, improved), "</script>\n");
   return Section("objects", "On the object", "Where on the surface the model is early or late.", body);
 }
 

@@ -100,6 +100,18 @@ std::string Section(absl::string_view id, absl::string_view title, absl::string_
                       "</section>\n");
 }
 
+std::string PerKind(const v1::Report& report,
+                    const std::function<std::string(const v1::DataReport& data)>& part) {
+  std::string body;
+  for (const v1::DataReport& data : report.data()) {
+    const std::string own = part(data);
+    if (!own.empty() && report.data_size() > 1)
+      absl::StrAppend(&body, "<h3>", KindName(data.kind()), "</h3>\n");
+    body += own;
+  }
+  return body;
+}
+
 std::string Figure(absl::string_view picture, absl::string_view caption, absl::string_view css_class) {
   return absl::StrCat("<figure", css_class.empty() ? "" : absl::StrCat(" class=\"", css_class, "\""), ">",
                       picture, caption.empty() ? "" : absl::StrCat("<figcaption>", caption, "</figcaption>"),
@@ -136,8 +148,8 @@ std::string Bar(double share, absl::string_view css_class, double mark) {
   return svg + "</svg>";
 }
 
-std::string FingerName(const v1::Report& report, int finger) {
-  return finger < report.fingers_size() ? report.fingers(finger) : absl::StrCat(finger);
+std::string FingerName(const v1::DataReport& data, int finger) {
+  return finger < data.fingers_size() ? data.fingers(finger) : absl::StrCat(finger);
 }
 
 std::string Legend(const std::vector<std::pair<std::string, std::string>>& keys) {

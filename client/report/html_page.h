@@ -1,6 +1,7 @@
 // Pieces of the HTML report. Each Html* function gives one section, empty if the report has nothing for it.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,10 @@ std::string Typeset(absl::string_view text);
 std::string Section(absl::string_view id, absl::string_view title, absl::string_view lead,
                     absl::string_view body);
 
+// What `part` gives of each kind of measurement, under its name where there are several.
+std::string PerKind(const v1::Report& report,
+                    const std::function<std::string(const v1::DataReport& data)>& part);
+
 // <figure> with its caption below; the caption says how the numbers were computed.
 std::string Figure(absl::string_view picture, absl::string_view caption, absl::string_view css_class = "");
 
@@ -36,8 +41,8 @@ std::string HeaderRow(const std::vector<std::string>& titles);
 // none).
 std::string Bar(double share, absl::string_view css_class, double mark = -1);
 
-// The finger's name, or its number if the report has no names.
-std::string FingerName(const v1::Report& report, int finger);
+// The finger's name, or its number if the entry has no names.
+std::string FingerName(const v1::DataReport& data, int finger);
 
 // A line of keys for charts: pairs of css class and plain text.
 std::string Legend(const std::vector<std::pair<std::string, std::string>>& keys);
@@ -57,7 +62,7 @@ std::string HtmlPhotographMethods(const v1::Report& report);
 std::string HtmlObjects(const v1::Report& report);  // residuals on the surface
 std::string HtmlFit(const v1::Report& report);      // parity and histograms
 std::string HtmlDistributions(const v1::Report& report);
-std::string HtmlNextTouches(const v1::Report& report);
+std::string HtmlNextTouches(const v1::Report& report);  // what to measure next
 std::string HtmlData(const v1::Report& report);
 std::string HtmlProvenance(const v1::Report& report);
 std::string HtmlMethods(const v1::Report& report);  // how the numbers were computed

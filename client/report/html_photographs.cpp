@@ -22,8 +22,8 @@ std::string Picture(const std::string& png, const std::string& title) {
 std::string SideBySide(const v1::Report& report) {
   const bool improved = !report.improved_model_yaml().empty();
   std::string body;
-  for (const v1::PhotographMap& map : report.photographs().maps()) {
-    const std::string scale = absl::StrCat("\u00b1", Fixed(map.residual_scale_grey(), 0));
+  for (const v1::PhotographMap& map : MainData(report).photographs().maps()) {
+    const std::string scale = absl::StrCat("\u00b1", Fixed(map.residual_scale(), 0));
     absl::StrAppend(
         &body, "<h3>Image ", map.image(), ", ", Escape(map.object()), "</h3>\n<div class=\"photos\">",
         Picture(map.measured_png(), "measured"),
@@ -44,7 +44,7 @@ std::string SideBySide(const v1::Report& report) {
 }
 
 std::string Outlines(const v1::Report& report) {
-  const v1::PhotographSummary& s = report.photographs();
+  const v1::PhotographSummary& s = MainData(report).photographs();
   if (std::isnan(s.silhouette_iou())) return "";
   const bool improved = !report.improved_model_yaml().empty();
   std::string table =
@@ -68,13 +68,14 @@ std::string Outlines(const v1::Report& report) {
 
 std::string OneByOne(const v1::Report& report) {
   std::vector<const v1::PhotographError*> errors;
-  for (const v1::PhotographError& error : report.photographs().photographs()) errors.push_back(&error);
+  for (const v1::PhotographError& error : MainData(report).photographs().photographs())
+    errors.push_back(&error);
   if (errors.size() < 2) return "";
   std::stable_sort(errors.begin(), errors.end(),
-                   [](const auto* a, const auto* b) { return a->rmse_grey() > b->rmse_grey(); });
-  const ErrorScale scale(report);
+                   [](const auto* a, const auto* b) { return a->rmse() > b->rmse(); });
+  const ErrorScale scale(MainData(report));
   const bool improved = !report.improved_model_yaml().empty();
-  const double largest = errors[0]->rmse_grey(), floor = NoiseFloorOf(report).sigma;
+  const double largest = errors[0]->rmse(), floor = NoiseFloorOf(MainData(report)).sigma;
   std::vector<std::string> titles = {"Image", "Object", ">RMSE", ""};
   if (improved) titles.push_back(">with the improved model");
   titles.insert(titles.end(), {">Mean residual", ">Outline IoU", ">Outline apart"});
@@ -83,10 +84,10 @@ std::string OneByOne(const v1::Report& report) {
     const v1::PhotographError& error = *errors[k];
     absl::StrAppend(
         &table, "<tr>", Cell(absl::StrCat(error.image())), Cell(Escape(error.object()), "name"),
-        NumberCell(scale.Text(error.rmse_grey())),
-        Cell(Bar(error.rmse_grey() / largest, "given", floor > 0 ? floor / largest : -1), "barcell narrow"),
-        improved ? NumberCell(scale.Text(error.rmse_after_grey())) : "",
-        NumberCell(scale.Signed(error.mean_residual_grey())), NumberCell(Fixed(error.silhouette_iou(), 3)),
+        NumberCell(scale.Text(error.rmse())),
+        Cell(Bar(error.rmse() / largest, "given", floor > 0 ? floor / largest : -1), "barcell narrow"),
+        improved ? NumberCell(scale.Text(error.rmse_after())) : "",
+        NumberCell(scale.Signed(error.mean_residual())), NumberCell(Fixed(error.silhouette_iou(), 3)),
         NumberCell(std::isnan(error.contour_distance_px())
                        ? "n/a"
                        : absl::StrCat(Fixed(error.contour_distance_px(), 2), " px")),
@@ -109,28 +110,32 @@ std::string Place(const v1::Vector3& v, double factor, int decimals) {
 }  // namespace
 
 std::string HtmlPhotographs(const v1::Report& report) {
-  if (!report.has_photographs()) return "";
+  if (!MainData(report).has_photographs()) return "";
   return Section("photographs", "Photographs",
                  "A few pictures side by side: those that are off most, and one of middling error.",
                  absl::StrCat(SideBySide(report), Outlines(report), OneByOne(report)));
 }
 
 std::string HtmlNextPhotographs(const v1::Report& report) {
-  if (report.next_photographs().empty()) return "";
   std::string table = absl::StrCat("<div class=\"scroll\"><table>",
                                    HeaderRow({">No.", "Object", ">Eye x y z (mm)", ">At x y z (mm)", ">Up",
                                               ">Apart (sigmas)", "What it is for"}),
                                    "<tbody>");
   int number = 0;
-  for (const v1::ProposedPhotograph& next : report.next_photographs())
+  for (const v1::NextMeasurement& next : report.next()) {
+    if (!next.has_photograph()) continue;
+    const v1::CameraPose& camera = next.photograph();
+    const std::string verdict = CountToVerdict(next);
     absl::StrAppend(
         &table, "<tr>", NumberCell(absl::StrCat(++number)), Cell(Escape(next.object())),
-        NumberCell(Place(next.camera().eye_m(), 1000, 1)), NumberCell(Place(next.camera().at_m(), 1000, 1)),
-        NumberCell(Place(next.camera().up(), 1, 2)),
+        NumberCell(Place(camera.eye_m(), 1000, 1)), NumberCell(Place(camera.at_m(), 1000, 1)),
+        NumberCell(Place(camera.up(), 1, 2)),
         NumberCell(next.separation() > 0 ? Number(next.separation(), 2) : ""),
-        Cell(absl::StrCat(Typeset(next.purpose()), VerdictPictures(next).empty() ? "" : "<br><small>",
-                          VerdictPictures(next), VerdictPictures(next).empty() ? "" : "</small>")),
+        Cell(absl::StrCat(Typeset(next.purpose()),
+                          verdict.empty() ? "" : absl::StrCat("<br><small>", verdict, "</small>"))),
         "</tr>\n");
+  }
+  if (number == 0) return "";
   return Section(
       "next-pictures", "Next pictures",
       "Pictures that would discriminate between the remaining explanations.",
@@ -140,7 +145,7 @@ std::string HtmlNextPhotographs(const v1::Report& report) {
 }
 
 std::string HtmlPhotographMethods(const v1::Report& report) {
-  if (!(report.initial().rmse_grey() > 0)) return "";
+  if (!(MainData(report).initial().rmse() > 0)) return "";
   return Section(
       "methods", "How the numbers were computed", "",
       "<dl><dt>Residual</dt><dd>Measured minus expected grey level of a pixel (0 to 255), for the commanded "

@@ -14,7 +14,7 @@ constexpr int kCommandColumns = 96;  // that a page has room for
 
 // Errors before and after, as bars of one scale; nothing where the file cannot be fixed.
 std::string ErrorBars(const ErrorScale& scale, const v1::DataProblem& problem) {
-  const double before = scale.Before(problem), after = scale.After(problem);
+  const double before = problem.error_before(), after = problem.error_after();
   if (!(before > 0) || !(after > 0)) return "";
   const double largest = std::max(before, after);
   const auto row = [&](const char* name, double error, const char* css_class) {
@@ -35,8 +35,8 @@ std::string HtmlDataProblems(const v1::Report& report) {
   int number = 0;
   for (const v1::DataProblem& problem : report.data_problems()) {
     const std::string id = absl::StrCat("fix", ++number);
-    std::string body =
-        absl::StrCat("<p>", Typeset(problem.words()), "</p>", ErrorBars(ErrorScale(report), problem));
+    std::string body = absl::StrCat("<p>", Typeset(problem.words()), "</p>",
+                                    ErrorBars(ErrorScale(DataOf(report, problem)), problem));
     if (!problem.fix().empty())
       absl::StrAppend(&body, "<div class=\"row\"><button type=\"button\" data-copy=\"", id,
                       "\">Copy</button><span>fixes the file</span></div>\n<pre id=\"", id, "\">",

@@ -47,9 +47,9 @@ std::string HtmlProvenance(const v1::Report& report) {
                      : Escape(absl::StrCat(report.version(), " of the server, ", provenance.client_version(),
                                            " of the client")));
   add("Seed", absl::StrCat(provenance.seed()));
-  add("Set", provenance.set_sha256().empty()
-                 ? ""
-                 : absl::StrCat(Escape(report.data().origin()), ", SHA-256 ", Hash(provenance.set_sha256())));
+  add("Set", provenance.set_sha256().empty() ? ""
+                                             : absl::StrCat(Escape(MainData(report).session()), ", SHA-256 ",
+                                                            Hash(provenance.set_sha256())));
   add("Model", report.model_hash().empty()
                    ? ""
                    : absl::StrCat(Escape(report.model_name()), ", hash ", Hash(report.model_hash())));

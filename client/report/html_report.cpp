@@ -15,7 +15,7 @@ std::string HtmlReport(const v1::Report& report) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
       "script-src 'unsafe-inline'",
-      report.photographs().maps().empty() ? "" : "; img-src data:", "\">\n<title>",
+      MainData(report).photographs().maps().empty() ? "" : "; img-src data:", "\">\n<title>",
       Escape(report.model_name().empty() ? "Touchstone report"
                                          : absl::StrCat("Touchstone report: ", report.model_name())),
       "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");

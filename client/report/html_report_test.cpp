@@ -47,25 +47,25 @@ TEST(HtmlReport, EscapesWhatUsersNamed) {
   report.set_model_hash(evil);
   report.set_improved_model_yaml(evil);
   report.add_warnings(evil);
-  report.mutable_data()->set_objects(0, evil);
-  report.mutable_data()->set_origin(evil);
-  report.mutable_data()->mutable_unused(0)->set_reason(evil);
-  for (auto& point : *report.mutable_surface_points()) point.set_object(evil);
-  for (auto& outline : *report.mutable_outlines()) outline.set_object(evil);
-  for (auto& touch : *report.mutable_worst_touches()) touch.set_object(evil);
-  for (auto& touch : *report.mutable_next_touches()) touch.set_object(evil);
-  for (auto& group : *report.mutable_groups()) group.set_name(evil);
-  for (auto& histogram : *report.mutable_histograms()) histogram.set_object(evil);
-  for (auto& finger : *report.mutable_fingers()) finger = evil;
-  for (auto& slice : *report.mutable_where()) slice.set_slice(evil);
-  for (auto& curve : *report.mutable_curves()) curve.set_covariate(evil);
+  report.mutable_data(0)->mutable_set()->set_objects(0, evil);
+  report.mutable_data(0)->set_session(evil);
+  report.mutable_data(0)->mutable_set_aside()->mutable_rows(0)->set_reason(evil);
+  for (auto& point : *report.mutable_data(0)->mutable_surface_points()) point.set_object(evil);
+  for (auto& outline : *report.mutable_data(0)->mutable_outlines()) outline.set_object(evil);
+  for (auto& touch : *report.mutable_data(0)->mutable_worst_touches()) touch.set_object(evil);
+  for (auto& touch : *report.mutable_next()) touch.set_object(evil);
+  for (auto& group : *report.mutable_data(0)->mutable_groups()) group.set_name(evil);
+  for (auto& histogram : *report.mutable_data(0)->mutable_histograms()) histogram.set_object(evil);
+  for (auto& finger : *report.mutable_data(0)->mutable_fingers()) finger = evil;
+  for (auto& slice : *report.mutable_data(0)->mutable_where()) slice.set_slice(evil);
+  for (auto& curve : *report.mutable_data(0)->mutable_curves()) curve.set_covariate(evil);
   for (auto& step : *report.mutable_steps()) {
     step.set_effect(evil);
     step.set_meaning(evil);
     step.mutable_parameters(0)->set_name(evil);
     step.mutable_parameters(0)->set_unit(evil);
   }
-  for (auto& candidate : *report.mutable_candidates()) candidate.set_note(evil);
+  for (auto& candidate : *report.mutable_data(0)->mutable_candidates()) candidate.set_note(evil);
   const std::string html = HtmlReport(report);
   EXPECT_EQ(Occurrences(html, "<script>alert"), 0);
   EXPECT_EQ(Occurrences(html, "<script>"), 1) << "the page's own";
@@ -95,7 +95,7 @@ TEST(HtmlReport, ShowsMistakesOfTheFileWithTheirEvidenceAndTheCommand) {
 
 TEST(HtmlReport, DrawsACurveWithoutANameWithItsKnots) {
   v1::Report report = UnexplainedReport();
-  v1::Unexplained& rest = *report.mutable_unexplained();
+  v1::Unexplained& rest = *report.mutable_data(0)->mutable_unexplained();
   rest.clear_formula();
   rest.clear_formula_yaml();
   rest.set_lookup_yaml("- lookup: {name: rest_session_time_s}\n");
@@ -137,8 +137,9 @@ TEST(HtmlReport, SaysHowToMakeItAgain) {
 
 TEST(HtmlReport, TestsEachFingerAgainstThePlaceInTheSession) {
   v1::Report report = MissingEffectsReport();
-  for (v1::CovariateCurve& curve : *report.mutable_curves()) curve.set_p(1), curve.set_p_after(1);
-  v1::FingerDependence* finger = report.mutable_curves(0)->add_fingers();
+  for (v1::CovariateCurve& curve : *report.mutable_data(0)->mutable_curves())
+    curve.set_p(1), curve.set_p_after(1);
+  v1::FingerDependence* finger = report.mutable_data(0)->mutable_curves(0)->add_fingers();
   finger->set_finger("m");
   finger->set_p(3e-9);
   finger->set_p_after(0.4);
@@ -148,28 +149,34 @@ TEST(HtmlReport, TestsEachFingerAgainstThePlaceInTheSession) {
 
 TEST(HtmlReport, SaysWhichObjectACandidateWasTriedAt) {
   v1::Report report = MissingEffectsReport();
-  v1::Candidate* candidate = report.mutable_candidates(0);
-  candidate->set_scope("object");
-  candidate->mutable_parameters(0)->set_object("lat10");
+  v1::Candidate* candidate = report.mutable_data(0)->mutable_candidates(0);
+  candidate->mutable_scope()->set_kind(v1::Scope::OBJECT);
+  candidate->mutable_scope()->add_objects("lat10");
   EXPECT_THAT(HtmlReport(report), HasSubstr("of lat10 only"));
-  *candidate->add_parameters() = candidate->parameters(0);
-  candidate->mutable_parameters(1)->set_object("lat20");
+  candidate->mutable_scope()->add_objects("lat20");
   EXPECT_THAT(HtmlReport(report), HasSubstr("a value per object"));
 }
 
 TEST(HtmlReport, OfBothKindsRanksCandidatesWithWhatBothShowInPlace) {
   v1::Report report = MissingEffectsReport();
   EXPECT_THAT(HtmlReport(report), HasSubstr("as the first to be added"));
-  report.set_images(20);
-  report.mutable_initial()->set_rmse_grey(6.5);
-  report.mutable_final()->set_rmse_grey(1.4);
+  v1::DataReport* photographs = report.add_data();
+  photographs->set_kind(v1::DataReport::PHOTOGRAPHS);
+  photographs->set_unit("grey");
+  photographs->set_count(20);
+  photographs->mutable_initial()->set_rmse(6.5);
+  photographs->mutable_final()->set_rmse(1.4);
   report.mutable_steps(0)->set_effect("object_pose");
-  report.mutable_steps(0)->set_shown_by("both");
-  v1::Candidate* tilt = report.mutable_candidates(0);
-  tilt->set_rmse_us(3210), tilt->set_heldout_rmse_us(3210);
+  report.mutable_steps(0)->add_shown_by(v1::DataReport::TOUCHES);
+  report.mutable_steps(0)->add_shown_by(v1::DataReport::PHOTOGRAPHS);
+  v1::Candidate* tilt = report.mutable_data(0)->mutable_candidates(0);
+  tilt->set_rmse(3210), tilt->set_heldout_rmse(3210);
   const std::string html = HtmlReport(report);
   EXPECT_THAT(html, HasSubstr("with object_pose in place"));
   EXPECT_THAT(html, HasSubstr(Typeset("3.21 ms")));
+  // Each kind under its name, with errors in its unit.
+  EXPECT_THAT(html, HasSubstr("<h3>Touches</h3>"));
+  EXPECT_THAT(html, HasSubstr("6.50 grey"));
 }
 
 TEST(HtmlReport, LeavesOutSectionsWithoutData) {
@@ -203,7 +210,7 @@ TEST(HtmlReport, ShowsTheSummaryWhereNoPartSaysTheSame) {
   v1::Report report = WithoutPosesReport();
   report.set_summary("A summary like no other.");
   EXPECT_EQ(Occurrences(HtmlReport(report), "A summary like no other."), 1);
-  *report.mutable_initial() = MissingEffectsReport().initial();
+  *report.mutable_data(0)->mutable_initial() = MissingEffectsReport().data(0).initial();
   EXPECT_EQ(Occurrences(HtmlReport(report), "A summary like no other."), 0);
 }
 
@@ -234,8 +241,8 @@ TEST(HtmlReport, IsSmallerThanAMegabyteAndAHalfFor960Touches) {
 TEST(HtmlReport, ThinsPointsOfLargeSets) {
   v1::Report report = CompareReport();
   for (int i = 0; i < 6; ++i) {
-    report.mutable_surface_points()->MergeFrom(CompareReport().surface_points());
-    report.mutable_parity()->MergeFrom(CompareReport().parity());
+    report.mutable_data(0)->mutable_surface_points()->MergeFrom(CompareReport().data(0).surface_points());
+    report.mutable_data(0)->mutable_parity()->MergeFrom(CompareReport().data(0).parity());
   }
   const std::string html = HtmlReport(report);
   EXPECT_LT(html.size(), 1500000u);
@@ -259,15 +266,15 @@ TEST(HtmlReport, ClosesEveryElementItOpens) {
 TEST(HtmlReport, ShowsNoNanAsANumber) {
   v1::Report report = MissingEffectsReport();
   const double nan = std::nan("");
-  report.mutable_initial()->set_lack_of_fit_p(nan);
-  report.mutable_initial()->set_heldout_rmse_us(nan);
+  report.mutable_data(0)->mutable_initial()->set_lack_of_fit_p(nan);
+  report.mutable_data(0)->mutable_initial()->set_heldout_rmse(nan);
   report.mutable_steps(0)->mutable_parameters(0)->set_std_error(nan);
   report.mutable_steps(0)->mutable_parameters(0)->set_lower(nan);
-  report.mutable_parity(0)->set_measured_us(nan);
-  report.mutable_surface_points(0)->set_after_us(nan);
-  report.mutable_surface_points(1)->set_x_mm(nan);
-  report.mutable_curves(0)->mutable_bins(0)->set_mean_residual_us(nan);
-  report.mutable_histograms(0)->set_measured(0, nan);
+  report.mutable_data(0)->mutable_parity(0)->set_measured(nan);
+  report.mutable_data(0)->mutable_surface_points(0)->set_after(nan);
+  report.mutable_data(0)->mutable_surface_points(1)->set_x_mm(nan);
+  report.mutable_data(0)->mutable_curves(0)->mutable_bins(0)->set_mean_residual(nan);
+  report.mutable_data(0)->mutable_histograms(0)->set_measured(0, nan);
   const std::string html = HtmlReport(report);
   for (const char* word : {" nan", ">nan", "\"nan", "-nan", "Lnan", "Mnan", "Vnan", "NaN", "inf "}) {
     EXPECT_EQ(Occurrences(html, word), 0) << word;
@@ -291,8 +298,8 @@ TEST(Bar, IsAsLongAsItsShare) {
 
 TEST(HtmlReport, LadderBarsAreProportionalToTheErrors) {
   v1::Report report = MissingEffectsReport();
-  report.mutable_initial()->set_rmse_us(40000);
-  report.mutable_steps(0)->set_rmse_us(10000);
+  report.mutable_data(0)->mutable_initial()->set_rmse(40000);
+  report.mutable_data(0)->mutable_after_step(0)->set_rmse(10000);
   const std::string html = HtmlReport(report);
   const std::string ladder = html.substr(html.find("class=\"ladder\""), 2500);
   EXPECT_THAT(ladder, HasSubstr("fill given\" height=\"100%\" width=\"100.00%\""));

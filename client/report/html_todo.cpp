@@ -58,7 +58,7 @@ std::string StepBody(const v1::Step& step) {
   std::string terms = absl::StrCat(Definition("To decide", step.discriminating_measurement()),
                                    Definition("To check on the rig", step.check_on_rig()),
                                    Definition("To fix it", step.remedy()));
-  if (step.scope() == "object") terms += Definition("Scope", "one value per object");
+  if (step.scope().kind() == v1::Scope::OBJECT) terms += Definition("Scope", "one value per object");
   if (step.probability() > 0) {
     const std::string p = EffectProbability(step.probability());
     terms += Definition("Probability",

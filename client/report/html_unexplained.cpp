@@ -14,12 +14,12 @@ namespace {
 
 // The curve over its covariate, a dot at each knot. It is drawn over all of the data, where it is constant beyond its
 // knots: a step of two knots next to each other would look like a slope.
-std::string CurvePicture(const v1::Report& report) {
-  const v1::UnexplainedCurve& curve = report.unexplained().curve();
+std::string CurvePicture(const v1::DataReport& data) {
+  const v1::UnexplainedCurve& curve = data.unexplained().curve();
   RangeFinder x, y;
   y.Add(0);
   double first = *curve.knots().begin(), last = *curve.knots().rbegin();
-  for (const v1::CovariateCurve& residuals : report.curves())
+  for (const v1::CovariateCurve& residuals : data.curves())
     for (const v1::CurveBin& bin : residuals.bins()) {
       if (residuals.covariate() != curve.covariate()) continue;
       first = std::min(first, bin.centre());
@@ -52,16 +52,16 @@ std::string CurvePicture(const v1::Report& report) {
   return absl::StrCat(Legend(keys), chart.Svg(absl::StrCat("The curve over ", axis)));
 }
 
-std::string LookupCurve(const v1::Report& report) {
-  const v1::Unexplained& rest = report.unexplained();
+std::string LookupCurve(const v1::DataReport& data) {
+  const v1::Unexplained& rest = data.unexplained();
   if (!rest.has_curve() || rest.curve().knots_size() < 2) return "";
   std::string terms;
   const auto add = [&terms](const char* term, const std::string& html) {
     absl::StrAppend(&terms, "<dt>", term, "</dt><dd>", html, "</dd>");
   };
-  const ErrorScale scale(report);
-  if (rest.formula().empty() && scale.Heldout(rest) > 0)
-    add("It would leave", absl::StrCat(Typeset(scale.Text(scale.Heldout(rest))), " on ", scale.readings(),
+  const ErrorScale scale(data);
+  if (rest.formula().empty() && rest.heldout_rmse() > 0)
+    add("It would leave", absl::StrCat(Typeset(scale.Text(rest.heldout_rmse())), " on ", scale.readings(),
                                        " left out of the fit; it removes ",
                                        Typeset(Share(rest.heldout_gain())), " of the excess error there"));
   if (!rest.nearest_formula().empty())
@@ -72,7 +72,7 @@ std::string LookupCurve(const v1::Report& report) {
     add("Nearest effect", Typeset(NearestEffectWords(rest)));
   return absl::StrCat(
       "<h3>The curve that fits, without a name</h3>\n",
-      Figure(CurvePicture(report),
+      Figure(CurvePicture(data),
              Typeset(absl::StrCat(
                  "Linear between its ", rest.curve().knots_size(),
                  " knots (dots), constant beyond them. A penalty keeps it as straight as the data "
@@ -88,10 +88,9 @@ std::string LookupCurve(const v1::Report& report) {
           : "");
 }
 
-}  // namespace
-
-std::string HtmlUnexplained(const v1::Report& report) {
-  const v1::Unexplained& rest = report.unexplained();
+// What one kind of measurement leaves.
+std::string RestOf(const v1::DataReport& data) {
+  const v1::Unexplained& rest = data.unexplained();
   std::string body;
   if (!rest.words().empty()) body = absl::StrCat("<p>", Typeset(rest.words()), "</p>\n");
   if (!rest.covariates().empty()) {
@@ -113,9 +112,9 @@ std::string HtmlUnexplained(const v1::Report& report) {
       absl::StrAppend(&body, "<dt>", Escape(ParameterName(parameter)), "</dt><dd>",
                       Typeset(ValueWithError(parameter)), "</dd>");
     }
-    const ErrorScale scale(report);
-    if (scale.Heldout(rest) > 0) {
-      absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(scale.Text(scale.Heldout(rest))), " on ",
+    const ErrorScale scale(data);
+    if (rest.heldout_rmse() > 0) {
+      absl::StrAppend(&body, "<dt>It would leave</dt><dd>", Typeset(scale.Text(rest.heldout_rmse())), " on ",
                       scale.readings(), " left out of the fit; it removes ",
                       Typeset(Share(rest.heldout_gain())), " of the excess error there</dd>");
     }
@@ -124,7 +123,7 @@ std::string HtmlUnexplained(const v1::Report& report) {
     }
     body += "</dl>\n";
   }
-  body += LookupCurve(report);
+  body += LookupCurve(data);
   if (!rest.formula_yaml().empty()) {
     absl::StrAppend(&body,
                     "<h3>To add it, under <code>effects</code> in the model file</h3>\n"
@@ -132,6 +131,13 @@ std::string HtmlUnexplained(const v1::Report& report) {
                     "<pre id=\"formula\">",
                     Escape(rest.formula_yaml()), "</pre>\n");
   }
+  return body;
+}
+
+}  // namespace
+
+std::string HtmlUnexplained(const v1::Report& report) {
+  const std::string body = PerKind(report, RestOf);
   return Section(
       "unexplained", "What no built-in effect explains",
       "A structure that is left after all steps. p: likelihood ratio of the best term, all terms paid for.",

@@ -34,17 +34,7 @@ std::string Pill(const v1::Report& report) {
 std::string Facts(const v1::Report& report) {
   std::string text = DataInWords(report, "\u00d7");
   text += ".";
-  const Floor floor = NoiseFloorOf(report);
-  const ErrorScale scale(report);
-  if (floor.sigma > 0) {
-    const std::string length = scale.grey() ? "levels of 255" : LengthOf(floor.sigma, report);
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", scale.Text(floor.sigma),
-                    length.empty() ? "" : absl::StrCat(" (", length, ")"));
-    if (floor.bound) absl::StrAppend(&text, ", an upper bound without repeats");
-    if (!floor.bound && report.data().repeats() > 0)
-      absl::StrAppend(&text, ", from ", Count(report.data().repeats()), " repeats");
-    text += ".";
-  }
+  text += NoiseFloorSentence(MainData(report));
   const std::string times = TimesTheFloor(report);
   if (!times.empty()) absl::StrAppend(&text, " The given model's error is ", times, ".");
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
@@ -55,7 +45,7 @@ std::string Facts(const v1::Report& report) {
 std::string LadderTable(const v1::Report& report) {
   const std::vector<Rung> rungs = Ladder(report);
   if (rungs.empty()) return "";
-  const ErrorScale scale(report);
+  const ErrorScale scale(MainData(report));
   static const char* const kClasses[] = {"given", "better", "better", "suggested", "floor"};
   double largest = 0, floor = -1;
   for (const Rung& rung : rungs) {
@@ -80,7 +70,7 @@ std::string LadderTable(const v1::Report& report) {
   }
   return Figure(
       absl::StrCat(table, "</tbody></table>"),
-      scale.grey()
+      scale.pictures()
           ? "RMSE of the residuals (measured minus expected grey levels, of 255), per pixel. Unseen "
             "pictures: the same on pictures left out of the fit. Lack-of-fit p: how likely that much "
             "misfit beyond noise is if nothing were missing. Dashed: the noise floor."
@@ -102,7 +92,8 @@ std::string HtmlHead(const v1::Report& report) {
                       Escape(report.model_hash().substr(0, 12)), "</code>");
     }
   }
-  if (!report.data().origin().empty()) absl::StrAppend(&head, " \u00b7 ", Escape(report.data().origin()));
+  if (!MainData(report).session().empty())
+    absl::StrAppend(&head, " \u00b7 ", Escape(MainData(report).session()));
   absl::StrAppend(&head, "</span></p>\n<h1>",
                   absl::StrReplaceAll(Typeset(Headline(report)), {{"built-in", "built\u2011in"}}), "</h1>\n",
                   LadderTable(report));

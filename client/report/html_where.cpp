@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include "client/report/error_scale.h"
@@ -17,58 +18,60 @@ namespace {
 constexpr double kDependenceP = 0.01;
 constexpr size_t kMinCurves = 4;  // shown even if the residual depends on none of them
 
-std::string Slices(const v1::Report& report) {
-  if (report.where().empty()) return "";
-  const ErrorScale scale(report);
+std::string Slices(const v1::DataReport& data) {
+  if (data.where().empty()) return "";
+  const ErrorScale scale(data);
   std::string table = absl::StrCat("<div class=\"scroll\"><table>",
-                                   HeaderRow({"Part of the data", scale.grey() ? ">Pictures" : ">Touches",
+                                   HeaderRow({"Part of the data", scale.pictures() ? ">Pictures" : ">Touches",
                                               ">Share of the excess", "", ">Mean residual", "In words"}),
                                    "<tbody>");
-  for (const v1::Slice& slice : report.where()) {
-    if (scale.Readings(slice) == 0) continue;  // of a joint report's touches
-    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"),
-                    NumberCell(Count(scale.Readings(slice))),
+  for (const v1::Slice& slice : data.where()) {
+    absl::StrAppend(&table, "<tr>", Cell(Typeset(slice.slice()), "name"), NumberCell(Count(slice.count())),
                     NumberCell(Share(slice.share_of_excess_error())),
                     Cell(Bar(slice.share_of_excess_error(), "given"), "barcell narrow"),
-                    NumberCell(scale.Signed(scale.Mean(slice))), Cell(Typeset(slice.words())), "</tr>\n");
+                    NumberCell(scale.Signed(slice.mean_residual())), Cell(Typeset(slice.words())), "</tr>\n");
   }
   return Figure(
       absl::StrCat(table, "</tbody></table></div>"),
       absl::StrCat(
           "Excess: the mean square error of the given model beyond the noise floor. Residuals are measured "
           "minus simulated: positive means that ",
-          scale.grey() ? "the picture is brighter" : "the real contact came later", " than the model says."));
+          scale.pictures() ? "the picture is brighter" : "the real contact came later",
+          " than the model says."));
 }
 
-std::string Groups(const v1::Report& report) {
-  static const std::pair<const char*, const char*> kKinds[] = {
-      {"object", "Object"}, {"face", "Face"},   {"finger", "Finger"},
-      {"speed", "Speed"},   {"round", "Round"}, {"time", "Time in the session"}};
-  std::vector<std::string> order;
-  std::map<std::string, std::vector<const v1::GroupError*>> kinds;
+// "Object", "Time in the session".
+std::string GroupTitle(v1::GroupError::Kind kind) {
+  if (kind == v1::GroupError::TIME) return "Time in the session";
+  std::string name = absl::AsciiStrToLower(v1::GroupError::Kind_Name(kind));
+  name[0] = absl::ascii_toupper(name[0]);
+  return name;
+}
+
+std::string Groups(const v1::DataReport& data) {
+  std::vector<v1::GroupError::Kind> order;
+  std::map<v1::GroupError::Kind, std::vector<const v1::GroupError*>> kinds;
   double largest = 0;
-  const ErrorScale scale(report);
-  for (const v1::GroupError& group : report.groups()) {
-    if (scale.Readings(group) == 0) continue;  // of a joint report's touches
+  const ErrorScale scale(data);
+  for (const v1::GroupError& group : data.groups()) {
     if (kinds[group.kind()].empty()) order.push_back(group.kind());
     kinds[group.kind()].push_back(&group);
-    largest = std::max(largest, scale.Rmse(group));
+    largest = std::max(largest, group.rmse());
   }
   if (order.empty()) return "";
-  const double floor = NoiseFloorOf(report).sigma;
+  const double floor = NoiseFloorOf(data).sigma;
   std::string grid;
-  for (const std::string& kind : order) {
+  for (const v1::GroupError::Kind kind : order) {
     if (kinds[kind].size() < 2) continue;  // one group is the whole set
-    std::string title = kind;
-    for (const auto& [name, shown] : kKinds) title = name == kind ? shown : title;
-    std::string table = absl::StrCat("<table>", HeaderRow({title, ">RMSE", "", ">of excess"}), "<tbody>");
+    std::string table =
+        absl::StrCat("<table>", HeaderRow({GroupTitle(kind), ">RMSE", "", ">of excess"}), "<tbody>");
     for (const v1::GroupError* group : kinds[kind]) {
       absl::StrAppend(
           &table, "<tr title=\"",
-          Escape(absl::StrCat(Count(scale.Readings(*group)), " ", scale.readings(), ", mean residual ",
-                              scale.Signed(scale.Mean(*group)))),
-          "\">", Cell(Escape(group->name())), NumberCell(scale.Text(scale.Rmse(*group))),
-          Cell(Bar(scale.Rmse(*group) / largest, "given", floor > 0 ? floor / largest : -1), "barcell"),
+          Escape(absl::StrCat(Count(group->count()), " ", scale.readings(), ", mean residual ",
+                              scale.Signed(group->mean_residual()))),
+          "\">", Cell(Escape(group->name())), NumberCell(scale.Text(group->rmse())),
+          Cell(Bar(group->rmse() / largest, "given", floor > 0 ? floor / largest : -1), "barcell"),
           NumberCell(Share(group->share_of_excess_error())), "</tr>");
     }
     absl::StrAppend(&grid, "<figure>", table, "</tbody></table></figure>\n");
@@ -101,34 +104,27 @@ std::string FingerDependences(const v1::CovariateCurve& curve, bool improved) {
   return items.empty() ? "" : absl::StrCat("<figcaption>", items, "</figcaption>");
 }
 
-// A joint report has curves of touches, finger by finger, and of photographs.
-bool OfTouches(const v1::CovariateCurve& curve) {
-  return !curve.bins().empty() && !curve.bins(0).finger().empty();
-}
-
 // Before and after share the vertical axis, in the unit that fits the larger.
-std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve) {
+std::string CurvePair(const ErrorScale& scale, const v1::CovariateCurve& curve, bool improved) {
   RangeFinder x, y;
   y.Add(0);
   double size = 0;
-  const ErrorScale scale(OfTouches(curve) ? v1::Report() : report);
   for (const v1::CurveBin& bin : curve.bins()) {
-    const double error = std::isfinite(scale.StdError(bin)) ? scale.StdError(bin) : 0;
-    size = std::max({size, std::abs(scale.Mean(bin)), std::abs(scale.After(bin))});
+    const double error = std::isfinite(bin.std_error()) ? bin.std_error() : 0;
+    size = std::max({size, std::abs(bin.mean_residual()), std::abs(bin.after())});
     x.Add(bin.centre());
-    for (const double value : {scale.Mean(bin) - error, scale.Mean(bin) + error, scale.After(bin)})
+    for (const double value : {bin.mean_residual() - error, bin.mean_residual() + error, bin.after()})
       y.Add(value);
   }
-  const TimeUnit unit = scale.grey() ? TimeUnit{1, "grey levels"} : UnitOfTime(size);
+  const TimeUnit unit = scale.UnitFor(size);
   const Range us = y.Get();
   const Chart::Axis x_axis = {AxisTitle(curve), x.Get()};
   const Chart::Axis y_axis = {absl::StrCat("mean residual (", unit.symbol, ")"),
                               {us.low * unit.per_us, us.high * unit.per_us}};
   std::string pair;
   for (const bool after : {false, true}) {
-    if (after && report.improved_model_yaml().empty()) break;
-    Chart chart(report.improved_model_yaml().empty() ? 480 : 232, 190,
-                after ? "improved model" : "given model", x_axis, y_axis);
+    if (after && !improved) break;
+    Chart chart(improved ? 232 : 480, 190, after ? "improved model" : "given model", x_axis, y_axis);
     chart.ZeroLine();
     std::vector<std::string> fingers;
     for (const v1::CurveBin& bin : curve.bins()) {
@@ -140,17 +136,16 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
       std::vector<double> errors;
       for (const v1::CurveBin& bin : curve.bins()) {
         if (bin.finger() != fingers[f]) continue;
-        points.push_back({bin.centre(), (after ? scale.After(bin) : scale.Mean(bin)) * unit.per_us});
-        errors.push_back(scale.StdError(bin) * unit.per_us);
+        points.push_back({bin.centre(), (after ? bin.after() : bin.mean_residual()) * unit.per_us});
+        errors.push_back(bin.std_error() * unit.per_us);
       }
       const std::string css = absl::StrCat("f", f % 6);
       if (!after) chart.Whiskers(points, errors, css);
       chart.Line(points, css);
     }
-    pair += chart.Svg(absl::StrCat("Mean residual", scale.grey() ? "" : " of each finger", " against ",
+    pair += chart.Svg(absl::StrCat("Mean residual", scale.pictures() ? "" : " of each finger", " against ",
                                    x_axis.title, ", ", after ? "improved model" : "given model"));
   }
-  const bool improved = !report.improved_model_yaml().empty();
   const bool still = improved && curve.p_after() < kDependenceP;
   return absl::StrCat("<figure><p class=\"head\">", Typeset(x_axis.title), " <span>",
                       Typeset(DependenceWords(curve.p(), curve.p_after(), improved)),
@@ -162,11 +157,12 @@ std::string CurvePair(const v1::Report& report, const v1::CovariateCurve& curve)
 }
 
 // Strongest dependence first; those of numbered groups (face 3) are left to the tables of groups.
-std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::Report& report) {
+std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::DataReport& data) {
   std::set<std::string> kinds;
-  for (const v1::GroupError& group : report.groups()) kinds.insert(group.kind());
+  for (const v1::GroupError& group : data.groups())
+    kinds.insert(absl::AsciiStrToLower(v1::GroupError::Kind_Name(group.kind())));
   std::vector<const v1::CovariateCurve*> curves;
-  for (const v1::CovariateCurve& curve : report.curves()) {
+  for (const v1::CovariateCurve& curve : data.curves()) {
     if (!curve.bins().empty() && kinds.count(curve.covariate()) == 0) curves.push_back(&curve);
   }
   const auto rank = [](const v1::CovariateCurve* curve) {
@@ -177,8 +173,9 @@ std::vector<const v1::CovariateCurve*> CurvesToShow(const v1::Report& report) {
   return curves;
 }
 
-std::string Curves(const v1::Report& report) {
-  const std::vector<const v1::CovariateCurve*> curves = CurvesToShow(report);
+std::string Curves(const v1::DataReport& data, bool improved) {
+  const ErrorScale scale(data);
+  const std::vector<const v1::CovariateCurve*> curves = CurvesToShow(data);
   if (curves.empty()) return "";
   std::string open, folded;
   std::vector<std::pair<std::string, std::string>> keys;
@@ -187,7 +184,7 @@ std::string Curves(const v1::Report& report) {
     // The place in the session is always shown: what changes with it is no noise.
     const bool depends = curve->p() < kDependenceP || curve->p_after() < kDependenceP ||
                          !curve->fingers().empty() || shown < kMinCurves;
-    (depends ? open : folded) += CurvePair(report, *curve);
+    (depends ? open : folded) += CurvePair(scale, *curve, improved);
     shown += depends;
     for (const v1::CurveBin& bin : curve->bins()) {
       const std::string finger = absl::StrCat("finger ", bin.finger());
@@ -206,17 +203,20 @@ std::string Curves(const v1::Report& report) {
       "</div>\n", folded,
       "<p class=\"note\">Means within bins, whiskers one standard error. p: of any dependence, by "
       "permutation, corrected for the number of covariates",
-      ErrorScale(report).grey() ? "; pictures of one pose count as one.</p>\n"
-                                : " (and of fingers, where each is tested alone). Only differences between "
-                                  "fingers are measured, so what "
-                                  "one finger does shows in the others with the other sign.</p>\n");
+      scale.pictures() ? "; pictures of one pose count as one.</p>\n"
+                       : " (and of fingers, where each is tested alone). Only differences between "
+                         "fingers are measured, so what "
+                         "one finger does shows in the others with the other sign.</p>\n");
 }
 
 }  // namespace
 
 std::string HtmlWhere(const v1::Report& report) {
-  return Section("where", "Where", "The parts of the data in which the given model is wrong.",
-                 absl::StrCat(Slices(report), Groups(report), Curves(report)));
+  const bool improved = !report.improved_model_yaml().empty();
+  const std::string body = PerKind(report, [&](const v1::DataReport& data) {
+    return absl::StrCat(Slices(data), Groups(data), Curves(data, improved));
+  });
+  return Section("where", "Where", "The parts of the data in which the given model is wrong.", body);
 }
 
 }  // namespace touchstone::client

@@ -24,11 +24,9 @@ std::string ShortName(const v1::ParameterValue& parameter) {
 
 // Where an effect of objects is tried: at one of them, or at each with a value of its own.
 std::string ScopeWords(const v1::Candidate& candidate) {
-  if (candidate.scope() != "object") return "";
-  std::set<std::string> objects;
-  for (const v1::ParameterValue& parameter : candidate.parameters()) objects.insert(parameter.object());
-  if (objects.size() != 1 || objects.begin()->empty()) return "<br><small>a value per object</small>";
-  return absl::StrCat("<br><small>of ", Escape(*objects.begin()), " only</small>");
+  if (candidate.scope().kind() != v1::Scope::OBJECT) return "";
+  if (candidate.scope().objects_size() != 1) return "<br><small>a value per object</small>";
+  return absl::StrCat("<br><small>of ", Escape(candidate.scope().objects(0)), " only</small>");
 }
 
 // Beside what each effect is tried: candidates of a joint report are ranked with what both kinds of data show in place.
@@ -36,27 +34,37 @@ std::string InPlace(const v1::Report& report) {
   std::vector<std::string> shared;
   if (IsJoint(report))
     for (const v1::Step& step : report.steps())
-      if (step.shown_by() == "both") shared.push_back(step.effect());
+      if (step.shown_by_size() > 1) shared.push_back(step.effect());
   return shared.empty() ? "as the first to be added"
                         : absl::StrCat("with ", Join(shared, "and"), " in place");
 }
 
-// What a candidate alone would leave; one of a joint report that acts on touches has no error in grey levels.
-std::string LeftText(const ErrorScale& scale, const v1::Candidate& candidate) {
-  if (const double left = scale.Unseen(candidate); left > 0) return scale.Text(left);
-  const double left_us = UnseenError(candidate.heldout_rmse_us(), candidate.rmse_us());
-  return left_us > 0 ? Time(left_us) : "";
+// A candidate, and the entry in whose unit its errors are.
+struct RankedCandidate {
+  const v1::Candidate* candidate;
+  const v1::DataReport* data;
+  double Left() const { return UnseenError(*candidate); }
+};
+
+// Of all kinds of measurement.
+std::vector<RankedCandidate> Candidates(const v1::Report& report) {
+  std::vector<RankedCandidate> ranked;
+  for (const v1::DataReport& data : report.data())
+    for (const v1::Candidate& candidate : data.candidates()) ranked.push_back({&candidate, &data});
+  return ranked;
 }
 
 // Effects without a fit, by the reason why there is none.
 std::string NotFitted(const v1::Report& report) {
   std::vector<std::string> notes;
   std::map<std::string, std::vector<std::string>> effects;
-  for (const v1::Candidate& candidate : report.candidates()) {
-    if (ErrorScale(report).Rmse(candidate) > 0 || candidate.note().empty()) continue;
+  for (const RankedCandidate& ranked : Candidates(report)) {
+    const v1::Candidate& candidate = *ranked.candidate;
+    if (candidate.rmse() > 0 || candidate.note().empty()) continue;
     std::vector<std::string>& names = effects[candidate.note()];
     if (names.empty()) notes.push_back(candidate.note());
-    names.push_back(absl::StrCat(candidate.effect(), candidate.scope() == "object" ? " (per object)" : ""));
+    names.push_back(absl::StrCat(candidate.effect(),
+                                 candidate.scope().kind() == v1::Scope::OBJECT ? " (per object)" : ""));
   }
   std::string items;
   for (const std::string& note : notes) {
@@ -86,12 +94,12 @@ std::string ParameterCells(const Parameters& parameters) {
 }
 
 std::string CandidateTable(const v1::Report& report) {
-  if (report.candidates().empty()) return "";
-  const ErrorScale scale(report);
-  const double initial = scale.Unseen(report.initial());
-  const double floor = NoiseFloorOf(report).sigma;
-  double largest = initial;
-  for (const v1::Candidate& c : report.candidates()) largest = std::max(largest, scale.Unseen(c));
+  const std::vector<RankedCandidate> candidates = Candidates(report);
+  if (candidates.empty()) return "";
+  // Of each kind's errors the largest is the width of a bar.
+  std::map<const v1::DataReport*, double> largest;
+  for (const v1::DataReport& data : report.data()) largest[&data] = UnseenError(data.initial());
+  for (const RankedCandidate& one : candidates) largest[one.data] = std::max(largest[one.data], one.Left());
   std::string table = absl::StrCat("<div class=\"scroll\"><table class=\"why\">",
                                    HeaderRow({"Effect", ">Probability", ">It would leave", "",
                                               "Parameter \u00b1 standard error", "95 % interval"}),
@@ -108,19 +116,21 @@ std::string CandidateTable(const v1::Report& report) {
           ? ""
           : absl::StrCat(" Effects marked as one of these fit alike and share a probability of ",
                          EffectProbability(report.steps(0).probability()), ".");
-  for (const v1::Candidate& candidate : report.candidates()) {
-    if (!(scale.Rmse(candidate) > 0) && !candidate.note().empty()) continue;
-    const double left = scale.Unseen(candidate);
+  for (const RankedCandidate& ranked : candidates) {
+    const v1::Candidate& candidate = *ranked.candidate;
+    if (!(candidate.rmse() > 0) && !candidate.note().empty()) continue;
+    const double left = ranked.Left(), whole = largest[ranked.data];
+    const double floor = NoiseFloorOf(*ranked.data).sigma;
     const double p = candidate.probability();
     const bool shares = first_step.count(candidate.effect()) > 0;
     absl::StrAppend(
         &table, p < 0.05 || none ? "<tr class=\"dim\">" : "<tr>",
         Cell(absl::StrCat("<span class=\"name\">", Escape(candidate.effect()), "</span>",
                           ScopeWords(candidate), shares ? "<br><small>one of these</small>" : "")),
-        NumberCell(EffectProbability(p)), NumberCell(LeftText(scale, candidate)),
-        Cell(left > 0 ? Bar(left / largest, p < 0.05 || none ? "share" : "better",
-                            floor > 0 ? floor / largest : -1)
-                      : "",
+        NumberCell(EffectProbability(p)), NumberCell(left > 0 ? ErrorScale(*ranked.data).Text(left) : ""),
+        Cell(left > 0
+                 ? Bar(left / whole, p < 0.05 || none ? "share" : "better", floor > 0 ? floor / whole : -1)
+                 : "",
              "barcell"));
     if (candidate.note().empty()) {
       table += ParameterCells(candidate.parameters());
@@ -132,7 +142,7 @@ std::string CandidateTable(const v1::Report& report) {
   return Figure(absl::StrCat(table, "</tbody></table></div>"),
                 absl::StrCat(
                     "Each effect alone, ", Escape(InPlace(report)), ". It would leave: the RMSE on ",
-                    IsJoint(report) ? "readings" : scale.readings(),
+                    IsJoint(report) ? "readings" : ErrorScale(MainData(report)).readings(),
                     " left out of the fit, dashed the noise floor. Intervals: 95 %, the upright line is "
                     "zero, no effect.",
                     Typeset(shared))) +
@@ -158,7 +168,7 @@ std::string HtmlWhy(const v1::Report& report) {
   return Section(
       "why", none ? "What was tried" : "Why",
       absl::StrCat("Every effect of the catalogue", none ? " alone, judged on " : ", fitted and judged on ",
-                   ErrorScale(report).readings(), " that the fit did not see",
+                   ErrorScale(MainData(report)).readings(), " that the fit did not see",
                    none ? ": none explains the error." : "."),
       absl::StrCat(CandidateTable(report), Ambiguities(report)));
 }

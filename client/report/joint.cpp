@@ -1,8 +1,10 @@
 #include "client/report/joint.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "client/report/error_scale.h"
@@ -11,116 +13,132 @@
 namespace touchstone::client {
 namespace {
 
-struct JointRung {
-  std::string name, touches, photographs, shown_by;
+// A table with a column per kind of measurement; `text_last`: the last column is no number.
+struct JointTable {
+  std::vector<std::string> titles;
+  std::vector<std::vector<std::string>> rows;
+  bool text_last = false;
+  bool IsText(size_t column) const { return column == 0 || (text_last && column + 1 == titles.size()); }
 };
 
-std::string ShownBy(const std::string& kind) {
-  return kind == "both" ? "both" : kind.empty() ? "" : absl::StrCat(kind, " alone");
+std::string ShownBy(const v1::Step& step) {
+  if (step.shown_by_size() > 1) return "both";
+  return step.shown_by().empty() ? "" : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone";
 }
 
-std::vector<JointRung> RungsOfBoth(const v1::Report& report) {
-  const ErrorScale grey(report);
-  std::vector<JointRung> rungs = {
-      {"given model", Time(report.initial().rmse_us()), grey.Text(report.initial().rmse_grey()), ""}};
-  for (const v1::Step& step : report.steps())
-    rungs.push_back({absl::StrCat("+ ", StepName(step)), Time(step.rmse_us()), grey.Text(step.rmse_grey()),
-                     ShownBy(step.shown_by())});
-  if (report.noise_floor_us() > 0 && report.noise_floor_grey() > 0)
-    rungs.push_back({"noise floor", Time(report.noise_floor_us()), grey.Text(report.noise_floor_grey()), ""});
-  return rungs;
+// Errors after each step.
+JointTable LadderOfBoth(const v1::Report& report) {
+  JointTable table{{""}, {}, true};
+  const auto add = [&](const std::string& name, const auto& error_of, const std::string& shown_by) {
+    std::vector<std::string>& row = table.rows.emplace_back(1, name);
+    for (const v1::DataReport& data : report.data()) row.push_back(ErrorScale(data).Text(error_of(data)));
+    row.push_back(shown_by);
+  };
+  for (const v1::DataReport& data : report.data()) table.titles.push_back(ErrorScale(data).readings());
+  table.titles.push_back("shown by");
+  add(
+      "given model", [](const v1::DataReport& data) { return data.initial().rmse(); }, "");
+  for (int i = 0; i < report.steps_size(); ++i)
+    add(
+        absl::StrCat("+ ", StepName(report.steps(i))),
+        [i](const v1::DataReport& data) {
+          return i < data.after_step_size() ? data.after_step(i).rmse() : 0;
+        },
+        ShownBy(report.steps(i)));
+  if (std::all_of(report.data().begin(), report.data().end(),
+                  [](const v1::DataReport& data) { return data.noise_floor() > 0; }))
+    add(
+        "noise floor", [](const v1::DataReport& data) { return data.noise_floor(); }, "");
+  return table;
 }
 
-struct JointValue {
-  std::string name, value, touches, photographs;
-};
+// Values that both kinds show, with the standard errors that each alone would give.
+JointTable ValuesOfBoth(const v1::Report& report) {
+  JointTable table{{"", "from both"}, {}};
+  for (const v1::DataReport& data : report.data())
+    table.titles.push_back(absl::StrCat(ErrorScale(data).readings(), " alone"));
+  const auto add = [&](const auto& message) {
+    for (const v1::ParameterValue& p : message.parameters()) {
+      if (p.alone().empty()) continue;
+      const std::string unit = p.unit().empty() ? "" : absl::StrCat(" ", p.unit());
+      std::vector<std::string>& row = table.rows.emplace_back();
+      row = {absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ", p.finger(),
+                          p.object().empty() ? "" : " of ", p.object()),
+             absl::StrCat(Number(p.value(), 4), " +- ", Number(p.std_error(), 2), unit)};
+      for (const v1::DataReport& data : report.data()) {
+        const auto own = std::find_if(p.alone().begin(), p.alone().end(),
+                                      [&](const v1::ErrorAlone& one) { return one.kind() == data.kind(); });
+        row.push_back(own == p.alone().end() ? "says nothing"
+                                             : absl::StrCat("+- ", Number(own->std_error(), 2), unit));
+      }
+    }
+  };
+  for (const v1::Refit& refit : report.refitted()) add(refit);
+  for (const v1::Step& step : report.steps()) add(step);
+  return table;
+}
 
-template <typename Message>
-void AddValues(const Message& message, std::vector<JointValue>* values) {
-  for (const v1::ParameterValue& p : message.parameters()) {
-    if (!p.has_std_error_touches() && !p.has_std_error_photographs()) continue;
-    const std::string unit = p.unit().empty() ? "" : absl::StrCat(" ", p.unit());
-    const auto alone = [&](bool has, double error) {
-      return has ? absl::StrCat("+- ", Number(error, 2), unit) : "says nothing";
-    };
-    values->push_back({absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ",
-                                    p.finger(), p.object().empty() ? "" : " of ", p.object()),
-                       absl::StrCat(Number(p.value(), 4), " +- ", Number(p.std_error(), 2), unit),
-                       alone(p.has_std_error_touches(), p.std_error_touches()),
-                       alone(p.has_std_error_photographs(), p.std_error_photographs())});
+void AddTable(const JointTable& table, TextLayout* out) {
+  std::vector<std::vector<TextLayout::Cell>> rows(1);
+  for (size_t i = 0; i < table.titles.size(); ++i)
+    rows[0].push_back({table.titles[i], !table.IsText(i), TextLayout::kDim});
+  for (const std::vector<std::string>& row : table.rows) {
+    rows.emplace_back();
+    for (size_t i = 0; i < row.size(); ++i) rows.back().push_back({row[i], !table.IsText(i)});
   }
+  out->Rows(rows);
 }
 
-std::vector<JointValue> ValuesOfBoth(const v1::Report& report) {
-  std::vector<JointValue> values;
-  for (const v1::Refit& refit : report.refitted()) AddValues(refit, &values);
-  for (const v1::Step& step : report.steps()) AddValues(step, &values);
-  return values;
+std::string HtmlTable(const JointTable& table, const std::string& css_class) {
+  std::vector<std::string> titles;
+  for (size_t i = 0; i < table.titles.size(); ++i) {
+    std::string title = table.titles[i];
+    if (!title.empty()) title[0] = absl::ascii_toupper(title[0]);
+    titles.push_back(table.IsText(i) ? title : absl::StrCat(">", title));
+  }
+  std::string html = absl::StrCat("<table", css_class, ">", HeaderRow(titles), "<tbody>");
+  for (const std::vector<std::string>& row : table.rows) {
+    html += "<tr>";
+    for (size_t i = 0; i < row.size(); ++i)
+      html += table.IsText(i) ? Cell(Escape(row[i])) : NumberCell(row[i]);
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table>";
 }
 
 }  // namespace
 
-bool IsJoint(const v1::Report& report) {
-  return report.initial().rmse_us() > 0 && report.initial().rmse_grey() > 0;
-}
-
 std::string FallsOfBoth(const v1::Report& report) {
-  const ErrorScale grey(report);
   std::vector<std::string> falls;
-  const double from_us = report.initial().rmse_us(), to_us = report.final().rmse_us();
-  if (to_us > 0 && to_us < from_us && Time(to_us) != Time(from_us))
-    falls.push_back(absl::StrCat("from ", Time(from_us), " to ", Time(to_us), " on touches"));
-  const double from = report.initial().rmse_grey(), to = report.final().rmse_grey();
-  if (to > 0 && to < from && grey.Text(to) != grey.Text(from))
-    falls.push_back(absl::StrCat("from ", grey.Text(from), " to ", grey.Text(to), " on pictures"));
+  for (const v1::DataReport& data : report.data()) {
+    const ErrorScale scale(data);
+    const double from = data.initial().rmse(), to = data.final().rmse();
+    if (to > 0 && to < from && scale.Text(to) != scale.Text(from))
+      falls.push_back(
+          absl::StrCat("from ", scale.Text(from), " to ", scale.Text(to), " on ", scale.readings()));
+  }
   return falls.empty() ? "" : absl::StrCat("falls ", absl::StrJoin(falls, " and "));
 }
 
 void AddJoint(const v1::Report& report, TextLayout* out) {
   if (!IsJoint(report)) return;
-  using Cell = TextLayout::Cell;
-  std::vector<std::vector<Cell>> rows = {{{""},
-                                          {"touches", true, TextLayout::kDim},
-                                          {"pictures", true, TextLayout::kDim},
-                                          {"shown by", false, TextLayout::kDim}}};
-  for (const JointRung& rung : RungsOfBoth(report))
-    rows.push_back({{rung.name}, {rung.touches, true}, {rung.photographs, true}, {rung.shown_by}});
   out->Label("Both");
-  out->Rows(rows);
-  const std::vector<JointValue> values = ValuesOfBoth(report);
-  if (!values.empty()) {
-    rows = {{{""},
-             {"both", true, TextLayout::kDim},
-             {"touches alone", true, TextLayout::kDim},
-             {"pictures alone", true, TextLayout::kDim}}};
-    for (const JointValue& value : values)
-      rows.push_back({{value.name}, {value.value, true}, {value.touches, true}, {value.photographs, true}});
-    out->Rows(rows);
-  }
+  AddTable(LadderOfBoth(report), out);
+  const JointTable values = ValuesOfBoth(report);
+  if (!values.rows.empty()) AddTable(values, out);
   // A comparison has no more to say of both.
   if (report.verdict() != v1::Report::VERDICT_UNSPECIFIED) out->Paragraph(report.summary());
 }
 
 std::string HtmlJoint(const v1::Report& report) {
   if (!IsJoint(report)) return "";
-  std::string ladder = absl::StrCat("<table class=\"narrow\">",
-                                    HeaderRow({"", ">Touches", ">Pictures", "Shown by"}), "<tbody>");
-  for (const JointRung& rung : RungsOfBoth(report))
-    absl::StrAppend(&ladder, "<tr>", Cell(Escape(rung.name)), NumberCell(rung.touches),
-                    NumberCell(rung.photographs), Cell(Escape(rung.shown_by)), "</tr>\n");
   std::string body =
-      Figure(absl::StrCat(ladder, "</tbody></table>"),
+      Figure(HtmlTable(LadderOfBoth(report), " class=\"narrow\""),
              "RMSE of both kinds of data after each step, as comparisons with that model find it.");
-  const std::vector<JointValue> values = ValuesOfBoth(report);
-  if (!values.empty()) {
-    std::string table =
-        absl::StrCat("<div class=\"scroll\"><table>",
-                     HeaderRow({"Value", ">From both", ">Touches alone", ">Pictures alone"}), "<tbody>");
-    for (const JointValue& value : values)
-      absl::StrAppend(&table, "<tr>", Cell(Escape(value.name)), NumberCell(value.value),
-                      NumberCell(value.touches), NumberCell(value.photographs), "</tr>\n");
+  const JointTable values = ValuesOfBoth(report);
+  if (!values.rows.empty()) {
     body += Figure(
-        absl::StrCat(table, "</tbody></table></div>"),
+        absl::StrCat("<div class=\"scroll\">", HtmlTable(values, ""), "</div>"),
         "Fitted to the sum of both log likelihoods. Alone: the standard error that either kind of data would "
         "leave by itself.");
   }

@@ -8,9 +8,6 @@
 
 namespace touchstone::client {
 
-// Whether the report has errors of touches and of photographs.
-bool IsJoint(const v1::Report& report);
-
 // "falls from 26.2 to 3.1 ms on touches and from 6.35 to 1.43 grey on pictures", of what falls; empty: neither does.
 std::string FallsOfBoth(const v1::Report& report);
 

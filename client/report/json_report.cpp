@@ -7,9 +7,8 @@ namespace touchstone::client {
 
 absl::StatusOr<std::string> JsonReport(const v1::Report& report) {
   v1::Report complete = report;
-  complete.mutable_initial();
-  complete.mutable_final();
-  complete.mutable_unexplained();
+  for (v1::DataReport& data : *complete.mutable_data())
+    data.mutable_initial(), data.mutable_final(), data.mutable_unexplained();
   google::protobuf::util::JsonPrintOptions options;
   options.add_whitespace = true;
   options.always_print_primitive_fields = true;

@@ -1,6 +1,7 @@
 // The kinds of mistakes that a measurement file may have, in words.
 #include <map>
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
@@ -8,31 +9,36 @@
 
 namespace touchstone::client {
 
+std::string ProblemName(const v1::DataProblem& problem) {
+  return absl::AsciiStrToLower(v1::DataProblem::Kind_Name(problem.kind()));
+}
+
 std::string ProblemTitle(const v1::DataProblem& problem) {
-  static const std::map<std::string, const char*> kTitles = {
-      {"finger_order", "columns of the fingers exchanged"},
-      {"lateral_reversed", "lateral vectors reversed"},
-      {"approach_reversed", "approach vectors reversed"},
-      {"object_names", "names of objects exchanged"},
-      {"wrong_mesh", "an object's mesh is another's"},
-      {"frame", "another frame"},
-      {"units_time", "times in another unit"},
-      {"units_length", "lengths in another unit"},
-      {"speed_factor", "speeds off by a factor"},
-      {"row_shift", "results in the wrong rows"},
-      {"object_origin", "another origin of objects"},
-      {"duplicates", "rows copied under new numbers"},
+  static const std::map<v1::DataProblem::Kind, const char*> kTitles = {
+      {v1::DataProblem::FINGER_ORDER, "columns of the fingers exchanged"},
+      {v1::DataProblem::LATERAL_REVERSED, "lateral vectors reversed"},
+      {v1::DataProblem::APPROACH_REVERSED, "approach vectors reversed"},
+      {v1::DataProblem::OBJECT_NAMES, "names of objects exchanged"},
+      {v1::DataProblem::WRONG_MESH, "an object's mesh is another's"},
+      {v1::DataProblem::FRAME, "another frame"},
+      {v1::DataProblem::UNITS_TIME, "times in another unit"},
+      {v1::DataProblem::UNITS_LENGTH, "lengths in another unit"},
+      {v1::DataProblem::SPEED_FACTOR, "speeds off by a factor"},
+      {v1::DataProblem::ROW_SHIFT, "results in the wrong rows"},
+      {v1::DataProblem::OBJECT_ORIGIN, "another origin of objects"},
+      {v1::DataProblem::DUPLICATES, "rows copied under new numbers"},
+      {v1::DataProblem::STALE_ROWS, "rows that repeat the one before"},
       // Of photographs.
-      {"channel_order", "red and blue exchanged"},
-      {"mirrored", "mirrored pictures"},
-      {"rotated", "pictures turned"},
-      {"units_angle", "radians and degrees mixed up"},
-      {"up_axis", "another axis is up"},
-      {"eye_at", "eye and at exchanged"},
-      {"wrong_object", "another object"},
-      {"focal_factor", "another focal length"}};
+      {v1::DataProblem::CHANNEL_ORDER, "red and blue exchanged"},
+      {v1::DataProblem::MIRRORED, "mirrored pictures"},
+      {v1::DataProblem::ROTATED, "pictures turned"},
+      {v1::DataProblem::UNITS_ANGLE, "radians and degrees mixed up"},
+      {v1::DataProblem::UP_AXIS, "another axis is up"},
+      {v1::DataProblem::EYE_AT, "eye and at exchanged"},
+      {v1::DataProblem::WRONG_OBJECT, "another object"},
+      {v1::DataProblem::FOCAL_FACTOR, "another focal length"}};
   const auto title = kTitles.find(problem.kind());
-  return absl::StrCat(title == kTitles.end() ? problem.kind() : title->second,
+  return absl::StrCat(title == kTitles.end() ? "a mistake in the file" : title->second,
                       problem.detail().empty() ? "" : absl::StrCat(" (", problem.detail(), ")"));
 }
 

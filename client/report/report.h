@@ -19,7 +19,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour);
 std::string HtmlReport(const v1::Report& report);
 
 // Protobuf JSON with the names of the proto file. Every primitive and repeated field is there, and `initial`,
-// `final` and `unexplained` too, so that a reader need not ask. As everywhere in protobuf JSON, a number that
+// `final` and `unexplained` of each entry of data too, so that a reader need not ask. As everywhere in protobuf JSON, a number that
 // is not known is the string "NaN", and 64-bit integers are strings.
 absl::StatusOr<std::string> JsonReport(const v1::Report& report);
 

@@ -9,8 +9,8 @@ namespace touchstone::client {
 namespace {
 
 void SetQuality(double rmse_us, double heldout_us, double p, v1::Quality* quality) {
-  quality->set_rmse_us(rmse_us);
-  quality->set_heldout_rmse_us(heldout_us);
+  quality->set_rmse(rmse_us);
+  quality->set_heldout_rmse(heldout_us);
   quality->set_lack_of_fit_p(p);
 }
 
@@ -29,66 +29,83 @@ v1::ParameterValue* AddParameter(const char* name, const char* unit, double valu
 
 v1::Candidate* AddCandidate(const char* effect, double probability, double rmse_us, double gain,
                             v1::Report* report) {
-  v1::Candidate* candidate = report->add_candidates();
+  v1::Candidate* candidate = report->mutable_data(0)->add_candidates();
   candidate->set_effect(effect);
   candidate->set_probability(probability);
-  candidate->set_rmse_us(rmse_us);
-  candidate->set_heldout_rmse_us(rmse_us * 1.004);
+  candidate->set_rmse(rmse_us);
+  candidate->set_heldout_rmse(rmse_us * 1.004);
   candidate->set_gain_nats(gain);
-  candidate->set_scope("rig");
+  candidate->mutable_scope()->set_kind(v1::Scope::RIG);
   return candidate;
 }
 
 void AddSlice(const char* slice, uint32_t touches, double mean_us, double share, const char* words,
               v1::Report* report) {
-  v1::Slice* part = report->add_where();
+  v1::Slice* part = report->mutable_data(0)->add_where();
   part->set_slice(slice);
-  part->set_touches(touches);
-  part->set_mean_residual_us(mean_us);
+  part->set_count(touches);
+  part->set_mean_residual(mean_us);
   part->set_share_of_excess_error(share);
   part->set_words(words);
-  part->set_rmse_us(std::abs(mean_us) * 1.3);
+  part->set_rmse(std::abs(mean_us) * 1.3);
+}
+
+// An entry of touches that says how wrong the model is.
+v1::DataReport* AddTouches(uint32_t count, v1::Report* report) {
+  v1::DataReport* data = report->add_data();
+  data->set_kind(v1::DataReport::TOUCHES);
+  data->set_unit("us");
+  data->set_count(count);
+  for (const char* finger : {"l", "m", "r"}) data->add_fingers(finger);
+  return data;
+}
+
+// A further step, and the error after it.
+v1::Step* AddStep(const char* effect, double rmse_us, double heldout_us, double p, v1::Report* report) {
+  SetQuality(rmse_us, heldout_us, p, report->mutable_data(0)->add_after_step());
+  v1::Step* step = report->add_steps();
+  step->set_effect(effect);
+  step->mutable_scope()->set_kind(v1::Scope::RIG);
+  return step;
 }
 
 // What every report of a set with poses has.
 v1::Report Base(double initial_us, double floor_us) {
   v1::Report report;
-  report.set_touches(960);
-  report.set_noise_floor_us(floor_us);
-  SetQuality(initial_us, initial_us * 1.002, initial_us > 1.1 * floor_us ? 0 : 0.41,
-             report.mutable_initial());
-  *report.mutable_final() = report.initial();
-  report.set_reducible_share(std::max(0.0, 1 - floor_us * floor_us / initial_us / initial_us));
-  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
-  for (double bias : {2100.0, -3900.0, 1800.0}) report.add_finger_bias_us(bias * initial_us / 41000);
+  v1::DataReport& data = *AddTouches(960, &report);
+  data.set_session("measurements/lab-2026-03.csv");
+  SetQuality(initial_us, initial_us * 1.002, initial_us > 1.1 * floor_us ? 0 : 0.41, data.mutable_initial());
+  *data.mutable_final() = data.initial();
+  data.set_reducible_share(std::max(0.0, 1 - floor_us * floor_us / initial_us / initial_us));
+  for (double bias : {2100.0, -3900.0, 1800.0}) data.add_finger_bias(bias * initial_us / 41000);
   report.set_model_name("nominal");
   report.set_model_hash("7f1c09e3b2a84d55c0ffee00112233445566778899aabbccddeeff0011223344");
   report.set_version("0.2.0");
   report.set_duration_s(3.4);
-  v1::DataSummary& data = *report.mutable_data();
-  data.set_rows(1000);
-  data.set_poses(240);
-  data.set_rounds(4);
-  data.set_repeats(720);
-  data.add_speeds_mm_s(20);
-  data.set_missed_contacts(7);
-  data.set_origin("measurements/lab-2026-03.csv");
-  for (const char* object : {"lat10", "lat20", "box_rounded"}) data.add_objects(object);
-  v1::UnusedRows* edge = data.add_unused();
+  v1::DataSummary& set = *data.mutable_set();
+  set.set_rows(1000);
+  set.set_poses(240);
+  set.set_rounds(4);
+  set.set_repeats(720);
+  set.add_speeds_mm_s(20);
+  set.set_missed_contacts(7);
+  for (const char* object : {"lat10", "lat20", "box_rounded"}) set.add_objects(object);
+  data.mutable_set_aside()->set_count(40);
+  v1::UnusedRows* edge = data.mutable_set_aside()->add_rows();
   edge->set_rows(33);
   edge->set_reason("a finger within 0.3 mm of an edge");
   for (int touch : {12, 77, 103, 240, 391, 402}) edge->add_examples(touch);
-  v1::UnusedRows* lone = data.add_unused();
+  v1::UnusedRows* lone = data.mutable_set_aside()->add_rows();
   lone->set_rows(7);
   lone->set_reason("fewer than two fingers reported");
   for (int touch : {8, 19}) lone->add_examples(touch);
-  v1::NoiseFloor& floor = *report.mutable_noise_floor();
-  floor.set_sigma_us(floor_us);
-  floor.set_degrees_of_freedom(1440);
-  floor.set_lower_us(floor_us * 0.964);
-  floor.set_upper_us(floor_us * 1.038);
-  floor.set_from_repeats(true);
-  AddEvidence(initial_us, floor_us, &report);
+  data.set_noise_floor(floor_us);
+  v1::NoiseFloor& noise = *data.mutable_noise();
+  noise.set_degrees_of_freedom(1440);
+  noise.set_lower(floor_us * 0.964);
+  noise.set_upper(floor_us * 1.038);
+  noise.set_from_repeats(true);
+  AddEvidence(initial_us, floor_us, &data);
   return report;
 }
 
@@ -109,14 +126,10 @@ v1::Report MissingEffectsReport() {
   AddSlice("object = lat20 and face = side", 96, 6200, 0.18, "outer fingers too late by 6.2 ms", &report);
   AddSlice("curvature > 20 1/m and finger = m", 40, -850, 0.04, "contact too early by 850 us", &report);
 
-  v1::Step* radius = report.add_steps();
-  radius->set_effect("tip_radius");
+  v1::Step* radius = AddStep("tip_radius", 7900, 7950, 3e-12, &report);
   radius->add_equivalent("surface_offset");
   radius->set_probability(0.994);
   AddParameter("radius_mm", "mm", 2.981, 0.021, radius);
-  radius->set_rmse_us(7900);
-  radius->set_heldout_rmse_us(7950);
-  radius->set_lack_of_fit_p(3e-12);
   radius->set_gain_nats(2210);
   radius->set_meaning("The fingers end in balls; the model has points.");
   radius->set_remedy("Keep the radius in the model, or fit pointed tips.");
@@ -124,24 +137,17 @@ v1::Report MissingEffectsReport() {
       "Measure the tips, or touch one flat face at 0 and 25 deg: only the second shifts.");
   radius->set_discriminating_measurement(
       "touches on the edge of a box: a ball rolls over it, an offset does not");
-  radius->set_scope("rig");
-  v1::Step* latency = report.add_steps();
-  latency->set_effect("channel_latency");
+  v1::Step* latency = AddStep("channel_latency", 5010, 5030, 0.44, &report);
   latency->set_probability(0.97);
   for (const auto& [finger, value] :
        {std::pair<const char*, double>{"l", 8200}, {"m", -3900}, {"r", -4300}}) {
     AddParameter("latency_us", "us", value, 190, latency)->set_finger(finger);
   }
-  latency->set_rmse_us(5010);
-  latency->set_heldout_rmse_us(5030);
-  latency->set_lack_of_fit_p(0.44);
   latency->set_gain_nats(318);
   latency->set_meaning("One channel reports later than the others.");
   latency->set_remedy("Keep the latencies in the model, or poll the channels at once.");
   latency->set_check_on_rig("Swap the cables of two fingers: the delay moves with the channel.");
-  latency->set_scope("rig");
-  *report.mutable_final() = report.initial();
-  SetQuality(5010, 5030, 0.44, report.mutable_final());
+  SetQuality(5010, 5030, 0.44, report.mutable_data(0)->mutable_final());
 
   AddParameter("radius_mm", "mm", 2.975, 0.034, AddCandidate("tip_radius", 0.994, 7900, 2210, &report));
   AddParameter("travel_mm", "mm", 0.71, 0.031, AddCandidate("oblique_slip", 0.006, 12700, 1720, &report));
@@ -177,7 +183,7 @@ v1::Report WrongValuesReport() {
   v1::Refit* noise = report.add_refitted();
   noise->set_effect("gaussian_noise");
   AddParameter("sigma_us", "us", 812, 12, noise)->set_before(2000);
-  SetQuality(815, 818, 0.63, report.mutable_final());
+  SetQuality(815, 818, 0.63, report.mutable_data(0)->mutable_final());
   v1::Ambiguity* pair = report.add_ambiguities();
   for (const char* effect : {"contact_slowdown", "speed_error", "clock_skew"}) pair->add_effects(effect);
   pair->set_discriminating_measurement(
@@ -193,11 +199,12 @@ v1::Report AdequateReport() {
   v1::Report report = Base(5100, 5100);
   report.set_verdict(v1::Report::ADEQUATE);
   report.set_summary("What is left between model and measurements is noise.");
-  report.mutable_noise_floor()->set_from_repeats(false);
-  report.mutable_data()->set_repeats(0);
-  report.mutable_data()->set_rounds(1);
-  report.mutable_data()->clear_unused();
-  report.mutable_data()->set_rows(960);
+  v1::DataReport& data = *report.mutable_data(0);
+  data.mutable_noise()->set_from_repeats(false);
+  data.mutable_set()->set_repeats(0);
+  data.mutable_set()->set_rounds(1);
+  data.clear_set_aside();
+  data.mutable_set()->set_rows(960);
   report.add_warnings(
       "no touch was repeated, so the noise floor is an upper bound from the model's own residuals");
   AddParameter("radius_mm", "mm", 0.02, 0.04, AddCandidate("tip_radius", 0.02, 5099, -2.1, &report));
@@ -211,7 +218,7 @@ v1::Report UnexplainedReport() {
   report.set_summary(
       "The rest swings with the travel, four millimetres a period; no built-in effect does that.");
   AddSlice("travel > 60 mm and finger = r", 201, 6100, 0.41, "contact too late by 6.1 ms", &report);
-  v1::Unexplained& rest = *report.mutable_unexplained();
+  v1::Unexplained& rest = *report.mutable_data(0)->mutable_unexplained();
   for (const auto& [name, p] :
        {std::pair<const char*, double>{"travel_mm", 1e-9}, {"previous_press_mm", 0.003}}) {
     v1::CovariateTest* test = rest.add_covariates();
@@ -227,8 +234,8 @@ v1::Report UnexplainedReport() {
       "max: 10}}\n");
   AddParameter("k", "mm", 0.44, 0.012, &rest);
   AddParameter("lead", "mm", 4.01, 0.004, &rest);
-  rest.set_rmse_us(6200);
-  rest.set_heldout_rmse_us(6350);
+  rest.set_rmse(6200);
+  rest.set_heldout_rmse(6350);
   rest.set_heldout_gain(0.96);
   rest.set_nearest_effect("speed_error");
   rest.set_nearest_cosine(0.21);
@@ -239,9 +246,9 @@ v1::Report UnexplainedReport() {
 v1::Report CheckDataReport() {
   v1::Report report = Base(865613, 5103);
   report.set_verdict(v1::Report::CHECK_DATA);
-  report.clear_where();
+  report.mutable_data(0)->clear_where();
   v1::DataProblem* problem = report.add_data_problems();
-  problem->set_kind("lateral_reversed");
+  problem->set_kind(v1::DataProblem::LATERAL_REVERSED);
   problem->set_detail("lateral -> -lateral");
   problem->set_words(
       "It looks as if the lateral vectors point from the last finger to the first. With that fixed, the "
@@ -249,37 +256,36 @@ v1::Report CheckDataReport() {
       "is would be "
       "off by 14.4 ms instead of 866 ms.");
   problem->set_fix("touchstone session fix measurements/lab-2026-03.csv --reverse-lateral -o fixed.csv");
-  problem->set_rmse_before_us(865613);
-  problem->set_rmse_after_us(14433);
+  problem->set_error_before(865613);
+  problem->set_error_after(14433);
   v1::DataProblem* other = report.add_data_problems();
-  other->set_kind("finger_order");
+  other->set_kind(v1::DataProblem::FINGER_ORDER);
   other->set_detail("l <-> r");
   other->set_words(
       "These data cannot tell it from another mistake: the time columns of the fingers l and r are "
       "exchanged. With that fixed, "
       "the model as it is would be off by 14.4 ms instead of 866 ms.");
   other->set_fix("touchstone session fix measurements/lab-2026-03.csv --swap-fingers l,r -o fixed.csv");
-  other->set_rmse_before_us(865613);
-  other->set_rmse_after_us(14433);
+  other->set_error_before(865613);
+  other->set_error_after(14433);
   return report;
 }
 
 v1::Report TooLittleDataReport() {
   v1::Report report;
   report.set_verdict(v1::Report::TOO_LITTLE_DATA);
-  report.set_touches(6);
-  report.set_touches_needed(16);
-  SetQuality(25400, 25400, 1, report.mutable_initial());
-  *report.mutable_final() = report.initial();
-  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
+  v1::DataReport& data = *AddTouches(6, &report);
+  data.set_needed(16);
+  data.set_session("measurements/first-six.csv");
+  SetQuality(25400, 25400, 1, data.mutable_initial());
+  *data.mutable_final() = data.initial();
   report.set_model_name("nominal");
   report.set_summary("The model is off by 25.4 ms. That is too little for a verdict; 16 touches would do.");
-  v1::DataSummary& data = *report.mutable_data();
-  data.set_rows(6);
-  data.set_poses(6);
-  data.add_speeds_mm_s(20);
-  data.set_origin("measurements/first-six.csv");
-  data.add_objects("lat10");
+  v1::DataSummary& set = *data.mutable_set();
+  set.set_rows(6);
+  set.set_poses(6);
+  set.add_speeds_mm_s(20);
+  set.add_objects("lat10");
   report.add_warnings("Only 6 touches took part: weak effects stay unseen, and errors are rough.");
   return report;
 }
@@ -292,14 +298,13 @@ v1::Report CompareReport() {
 
 v1::Report WithoutPosesReport() {
   v1::Report report;
-  report.set_touches(800);
-  for (const char* finger : {"l", "m", "r"}) report.add_fingers(finger);
+  v1::DataReport& data = *AddTouches(800, &report);
+  data.set_kind(v1::DataReport::DISTRIBUTIONS);
   report.set_model_name("nominal");
-  v1::DataSummary& data = *report.mutable_data();
-  data.set_rows(800);
-  data.add_objects("cross");
-  data.add_objects("star");
-  v1::DistributionComparison& comparison = *report.mutable_distributions();
+  data.mutable_set()->set_rows(800);
+  data.mutable_set()->add_objects("cross");
+  data.mutable_set()->add_objects("star");
+  v1::DistributionComparison& comparison = *data.mutable_distributions();
   comparison.set_energy_distance(0.213);
   comparison.set_p(0.0005);
   comparison.set_simulated_touches(8000);
@@ -317,7 +322,7 @@ v1::Report WithoutPosesReport() {
   }
   for (const char* effect : {"gaussian_noise", "tip_radius"}) comparison.add_compatible_effects(effect);
   report.add_warnings("the set has no poses; two orders of magnitude weaker than touches with poses");
-  AddHistograms(30000, &report);
+  AddHistograms(30000, &data);
   return report;
 }
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include <absl/strings/match.h>
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
@@ -80,8 +80,8 @@ std::string Change(const ErrorScale& scale, double before, double after) {
 }  // namespace
 
 void AddDistributions(const v1::Report& report, TextLayout* out) {
-  if (!report.has_distributions()) return;
-  const v1::DistributionComparison& comparison = report.distributions();
+  if (!MainData(report).has_distributions()) return;
+  const v1::DistributionComparison& comparison = MainData(report).distributions();
   out->Label("How wrong");
   out->Paragraph(absl::StrCat("The set has no poses, so only distributions can be compared: energy distance ",
                               Number(comparison.energy_distance()), ", p ", Probability(comparison.p()),
@@ -115,13 +115,22 @@ void AddDistributions(const v1::Report& report, TextLayout* out) {
 
 void AddWhy(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<TextCell>> rows;
-  const ErrorScale scale(report);
-  double before = scale.Unseen(report.initial());
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  double before = UnseenError(data.initial());
   if (report.steps_size() > 0) {
     const std::string unseen = before > 0 ? absl::StrCat("unseen ", scale.readings()) : "";
     rows.push_back(
         {{""}, {""}, {"probability", true, TextLayout::kDim}, {unseen, true, TextLayout::kDim}, {""}});
   }
+  // A joint report ranks each kind's; their errors are told where they are of the same kind as the steps'.
+  std::vector<const v1::Candidate*> candidates;
+  std::set<const v1::Candidate*> of_data;
+  for (const v1::DataReport& one : report.data())
+    for (const v1::Candidate& candidate : one.candidates()) {
+      candidates.push_back(&candidate);
+      if (&one == &data) of_data.insert(&candidate);
+    }
   std::set<std::string> named;
   for (const v1::Refit& refit : report.refitted()) {
     AddEffect(refit, refit.effect(), std::nan(""), "", "put right", TextLayout::kPlain, &rows);
@@ -133,22 +142,24 @@ void AddWhy(const v1::Report& report, TextLayout* out) {
   }
   for (int i = 0; i < report.steps_size(); ++i) {
     const v1::Step& step = report.steps(i);
-    const double after = scale.Unseen(step);
+    const double after = i < data.after_step_size() ? UnseenError(data.after_step(i)) : 0;
     // The probability is that of the step with its equivalents.
     std::string note =
         step.equivalent().empty() ? "" : absl::StrCat("one of ", 1 + step.equivalent_size(), ", see below");
-    if (!step.shown_by().empty())
-      absl::StrAppend(
-          &note, note.empty() ? "" : "; ", "shown by ",
-          step.shown_by() == "both" ? "touches and pictures" : absl::StrCat(step.shown_by(), " alone"));
+    if (step.shown_by_size() > 0)
+      absl::StrAppend(&note, note.empty() ? "" : "; ", "shown by ",
+                      step.shown_by_size() > 1
+                          ? "touches and pictures"
+                          : absl::AsciiStrToLower(KindName(step.shown_by(0))) + " alone");
     AddEffect(step, absl::StrCat(i == 0 ? "" : "+ ", step.effect()), step.probability(),
               Change(scale, before, after), note, TextLayout::kPlain, &rows);
     // What else could stand in the place of the first step.
-    for (int c = 0, shown = 0; i == 0 && c < report.candidates_size() && shown < kMaxCompetingEffects; ++c) {
-      const v1::Candidate& candidate = report.candidates(c);
+    for (size_t c = 0, shown = 0; i == 0 && c < candidates.size() && shown < kMaxCompetingEffects; ++c) {
+      const v1::Candidate& candidate = *candidates[c];
       if (!(candidate.gain_nats() > 0) || !named.insert(candidate.effect()).second) continue;
       AddEffect(candidate, candidate.effect(), candidate.probability(),
-                Change(scale, before, scale.Unseen(candidate)), candidate.note(), TextLayout::kDim, &rows);
+                of_data.count(&candidate) > 0 ? Change(scale, before, UnseenError(candidate)) : "",
+                candidate.note(), TextLayout::kDim, &rows);
       ++shown;
     }
     before = after;
@@ -184,11 +195,8 @@ void AddLookup(const v1::Unexplained& rest, TextLayout* out) {
   out->Paragraph(text + ". --save-model FILE --with-formula writes the model with it.");
 }
 
-void AddUnexplained(const v1::Report& report, TextLayout* out) {
-  const v1::Unexplained& rest = report.unexplained();
-  if (rest.covariates().empty() && rest.formula().empty() && rest.words().empty()) return;
-  out->Label("Unexplained");
-  if (!rest.words().empty()) out->Paragraph(rest.words());
+// What one kind of measurement leaves.
+void AddRest(const v1::Unexplained& rest, const ErrorScale& scale, TextLayout* out) {
   if (!rest.covariates().empty()) {
     std::vector<std::string> names;
     for (int i = 0; i < std::min(rest.covariates_size(), 4); ++i) {
@@ -208,7 +216,8 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
   }
   std::string text = absl::StrCat("A suggestion, not a cause: ", rest.formula());
   if (rest.heldout_gain() > 0) {
-    absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen touches");
+    absl::StrAppend(&text, " removes ", Share(rest.heldout_gain()), " of the excess error on unseen ",
+                    scale.readings());
   }
   const std::string nearest = NearestEffectWords(rest);
   if (!nearest.empty()) absl::StrAppend(&text, "; ", nearest);
@@ -217,6 +226,19 @@ void AddUnexplained(const v1::Report& report, TextLayout* out) {
   if (rest.formula_yaml().empty()) return;
   out->Paragraph("To add it, put this under effects in the model file:");
   out->Verbatim(rest.formula_yaml());
+}
+
+void AddUnexplained(const v1::Report& report, TextLayout* out) {
+  std::set<std::string> told;  // a contradiction concerns both kinds
+  for (const v1::DataReport& data : report.data()) {
+    const v1::Unexplained& rest = data.unexplained();
+    if (rest.covariates().empty() && rest.formula().empty() && rest.words().empty()) continue;
+    if (told.empty()) out->Label("Unexplained");
+    const bool is_new = told.insert(rest.words()).second;
+    const std::string kind = report.data_size() > 1 ? absl::StrCat(KindName(data.kind()), ": ") : "";
+    if (!rest.words().empty() && is_new) out->Paragraph(absl::StrCat(kind, rest.words()));
+    AddRest(rest, ErrorScale(data), out);
+  }
 }
 
 void AddWhatToDo(const v1::Report& report, TextLayout* out) {
@@ -239,8 +261,9 @@ void AddWhatToDo(const v1::Report& report, TextLayout* out) {
   out->Label("");
 }
 
+namespace {
+
 void AddNextTouches(const v1::Report& report, TextLayout* out) {
-  if (report.next_touches().empty()) return;
   struct Purpose {
     std::set<std::string> objects;
     int touches = 0;
@@ -249,15 +272,16 @@ void AddNextTouches(const v1::Report& report, TextLayout* out) {
   };
   std::vector<std::string> order;
   std::map<std::string, Purpose> purposes;
-  for (const v1::ProposedTouch& touch : report.next_touches()) {
-    if (purposes.count(touch.purpose()) == 0) order.push_back(touch.purpose());
-    Purpose& purpose = purposes[touch.purpose()];
-    purpose.objects.insert(touch.object());
+  for (const v1::NextMeasurement& next : report.next()) {
+    if (!next.has_touch()) continue;
+    if (purposes.count(next.purpose()) == 0) order.push_back(next.purpose());
+    Purpose& purpose = purposes[next.purpose()];
+    purpose.objects.insert(next.object());
     ++purpose.touches;
-    purpose.separation = std::max(purpose.separation, touch.separation());
-    purpose.verdict = VerdictTouches(touch);
+    purpose.separation = std::max(purpose.separation, next.separation());
+    purpose.verdict = CountToVerdict(next);
   }
-  out->Label("Next touches");
+  if (!order.empty()) out->Label("Next touches");
   for (const std::string& name : order) {
     const Purpose& purpose = purposes[name];
     out->Paragraph(
@@ -268,22 +292,31 @@ void AddNextTouches(const v1::Report& report, TextLayout* out) {
   }
 }
 
+}  // namespace
+
+void AddNext(const v1::Report& report, TextLayout* out) {
+  AddNextTouches(report, out);
+  AddNextPhotographs(report, out);
+}
+
 void AddUnusedRows(const v1::Report& report, TextLayout* out) {
-  uint64_t rows = 0;
-  for (const v1::UnusedRows& unused : report.data().unused()) rows += unused.rows();
-  if (rows == 0) return;
+  uint64_t unused = 0, rows = 0;
+  for (const v1::DataReport& data : report.data())
+    unused += data.set_aside().count(), rows += data.set().rows();
+  if (unused == 0) return;
   out->Label("Not used");
-  out->Paragraph(absl::StrCat(Count(rows), " of ", Count(report.data().rows()), " rows:"));
-  for (const v1::UnusedRows& unused : report.data().unused()) {
-    std::string text = absl::StrCat(Count(unused.rows()), ": ", unused.reason());
-    if (!unused.examples().empty()) {
-      const int shown = std::min(unused.examples_size(), 5);
-      absl::StrAppend(&text, unused.examples_size() == 1 && unused.rows() == 1 ? " (touch " : " (touches ",
-                      absl::StrJoin(unused.examples().begin(), unused.examples().begin() + shown, ", "),
-                      unused.rows() > static_cast<uint32_t>(shown) ? ", ...)" : ")");
+  out->Paragraph(absl::StrCat(Count(unused), " of ", Count(rows), " rows:"));
+  for (const v1::DataReport& data : report.data())
+    for (const v1::UnusedRows& one : data.set_aside().rows()) {
+      std::string text = absl::StrCat(Count(one.rows()), ": ", one.reason());
+      if (!one.examples().empty()) {
+        const int shown = std::min(one.examples_size(), 5);
+        absl::StrAppend(&text, one.examples_size() == 1 && one.rows() == 1 ? " (touch " : " (touches ",
+                        absl::StrJoin(one.examples().begin(), one.examples().begin() + shown, ", "),
+                        one.rows() > static_cast<uint32_t>(shown) ? ", ...)" : ")");
+      }
+      out->Paragraph(text, TextLayout::kPlain, 2);
     }
-    out->Paragraph(text, TextLayout::kPlain, 2);
-  }
 }
 
 }  // namespace touchstone::client

@@ -11,7 +11,7 @@ void AddDataProblems(const v1::Report& report, TextLayout* out);   // mistakes o
 void AddWhy(const v1::Report& report, TextLayout* out);
 void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);
-void AddNextTouches(const v1::Report& report, TextLayout* out);
+void AddNext(const v1::Report& report, TextLayout* out);  // touches to make, pictures to take
 // Of photographs.
 void AddSilhouettes(const v1::Report& report, TextLayout* out);       // lines of "How wrong"
 void AddWorstPhotographs(const v1::Report& report, TextLayout* out);  // the pictures that are off most

@@ -26,8 +26,8 @@ std::string Place(const v1::Vector3& v) {
 }  // namespace
 
 void AddSilhouettes(const v1::Report& report, TextLayout* out) {
-  const v1::PhotographSummary& summary = report.photographs();
-  if (!report.has_photographs() || std::isnan(summary.silhouette_iou())) return;
+  const v1::PhotographSummary& summary = MainData(report).photographs();
+  if (!MainData(report).has_photographs() || std::isnan(summary.silhouette_iou())) return;
   const bool improved = !report.improved_model_yaml().empty();
   std::string text =
       absl::StrCat("Outlines: overlap (IoU) ",
@@ -41,12 +41,13 @@ void AddSilhouettes(const v1::Report& report, TextLayout* out) {
 }
 
 void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
-  if (!report.has_photographs() || report.photographs().photographs_size() < 2) return;
+  const v1::DataReport& data = MainData(report);
+  if (data.photographs().photographs_size() < 2) return;
   std::vector<const v1::PhotographError*> errors;
-  for (const v1::PhotographError& error : report.photographs().photographs()) errors.push_back(&error);
+  for (const v1::PhotographError& error : data.photographs().photographs()) errors.push_back(&error);
   std::stable_sort(errors.begin(), errors.end(),
-                   [](const auto* a, const auto* b) { return a->rmse_grey() > b->rmse_grey(); });
-  const ErrorScale scale(report);
+                   [](const auto* a, const auto* b) { return a->rmse() > b->rmse(); });
+  const ErrorScale scale(data);
   const bool improved = !report.improved_model_yaml().empty();
   std::vector<std::vector<TextLayout::Cell>> rows;
   for (size_t k = 0; k < std::min<size_t>(kWorstPictures, errors.size()); ++k) {
@@ -54,8 +55,7 @@ void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
     rows.push_back(
         {{absl::StrCat("image ", error.image())},
          {error.object()},
-         {improved ? scale.Change(error.rmse_grey(), error.rmse_after_grey()) : scale.Text(error.rmse_grey()),
-          true},
+         {improved ? scale.Change(error.rmse(), error.rmse_after()) : scale.Text(error.rmse()), true},
          {std::isnan(error.silhouette_iou()) ? ""
                                              : absl::StrCat("outline IoU ", Fixed(error.silhouette_iou(), 3)),
           false, TextLayout::kDim}});
@@ -65,16 +65,18 @@ void AddWorstPhotographs(const v1::Report& report, TextLayout* out) {
 }
 
 void AddNextPhotographs(const v1::Report& report, TextLayout* out) {
-  if (report.next_photographs().empty()) return;
-  out->Label("Next");
   std::vector<std::vector<TextLayout::Cell>> rows;
-  for (const v1::ProposedPhotograph& next : report.next_photographs())
+  for (const v1::NextMeasurement& next : report.next()) {
+    if (!next.has_photograph()) continue;
+    const std::string verdict = CountToVerdict(next);
     rows.push_back(
         {{absl::StrCat("picture of ", next.object())},
-         {absl::StrCat("from ", Place(next.camera().eye_m()), " mm at ", Place(next.camera().at_m()), " mm")},
+         {absl::StrCat("from ", Place(next.photograph().eye_m()), " mm at ", Place(next.photograph().at_m()),
+                       " mm")},
          {next.separation() > 0 ? absl::StrCat(Number(next.separation(), 2), " sigmas") : "", true},
-         {absl::StrCat(next.purpose(), VerdictPictures(next).empty() ? "" : ": ", VerdictPictures(next)),
-          false, TextLayout::kDim}});
+         {absl::StrCat(next.purpose(), verdict.empty() ? "" : ": ", verdict), false, TextLayout::kDim}});
+  }
+  if (!rows.empty()) out->Label("Next");
   out->Rows(rows);
 }
 

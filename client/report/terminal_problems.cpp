@@ -9,17 +9,17 @@ namespace touchstone::client {
 void AddDataProblems(const v1::Report& report, TextLayout* out) {
   if (report.data_problems().empty()) return;
   out->Label("Check");
-  const ErrorScale scale(report);
   for (const v1::DataProblem& problem : report.data_problems()) {
+    const ErrorScale scale(DataOf(report, problem));
     std::string text = absl::StrCat(ProblemTitle(problem), ".");
-    if (scale.Before(problem) > 0 && scale.After(problem) > 0)
+    if (problem.error_before() > 0 && problem.error_after() > 0)
       absl::StrAppend(&text, " RMSE of the given model ",
-                      scale.Change(scale.Before(problem), scale.After(problem)), " with the ",
-                      scale.grey() ? "set" : "file", " fixed.");
+                      scale.Change(problem.error_before(), problem.error_after()), " with the ",
+                      scale.pictures() ? "set" : "file", " fixed.");
     out->Paragraph(text);
     out->Paragraph(problem.words());
     if (!problem.fix().empty()) {
-      out->Paragraph(absl::StrCat("To fix it (", problem.kind(), "):"));
+      out->Paragraph(absl::StrCat("To fix it (", ProblemName(problem), "):"));
       out->Verbatim(ShellLines(problem.fix(), out->room() - 4));
     }
   }

@@ -21,20 +21,7 @@ constexpr double kSessionP = 0.01;
 void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
   absl::StrAppend(&text, ".");
-  const Floor floor = NoiseFloorOf(report);
-  const ErrorScale scale(report);
-  if (floor.sigma > 0) {
-    const std::string length = scale.grey() ? "levels of 255" : LengthOf(floor.sigma, report);
-    absl::StrAppend(&text, " Noise floor ", floor.bound ? "at most " : "", scale.Text(floor.sigma),
-                    length.empty() ? "" : absl::StrCat(" (", length, ")"));
-    if (floor.bound) {
-      absl::StrAppend(&text, ", an upper bound without repeats.");
-    } else if (report.data().repeats() > 0) {
-      absl::StrAppend(&text, ", from ", Count(report.data().repeats()), " repeats.");
-    } else {
-      absl::StrAppend(&text, ".");
-    }
-  }
+  text += NoiseFloorSentence(MainData(report));
   out->Lead(text);
   for (const std::string& warning : report.warnings())
     out->Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
@@ -45,54 +32,52 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
 }
 
 void AddHowWrong(const v1::Report& report, TextLayout* out) {
-  const ErrorScale scale(report);
-  if (!(scale.Rmse(report.initial()) > 0)) return;
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  if (!(data.initial().rmse() > 0)) return;
   const std::string times = TimesTheFloor(report);
   out->Label("How wrong");
   out->Paragraph(
-      absl::StrCat("RMSE ", scale.Text(scale.Rmse(report.initial())), times.empty() ? "" : ", ", times, "."));
+      absl::StrCat("RMSE ", scale.Text(data.initial().rmse()), times.empty() ? "" : ", ", times, "."));
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
     out->Paragraph(absl::StrCat("Of the fingers, ", FingerScatterWords(report), "."));
   AddSilhouettes(report, out);
-  if (report.finger_bias_us_size() > 0) {
-    std::vector<std::string> fingers;
-    for (int i = 0; i < report.finger_bias_us_size(); ++i) {
-      const std::string name = i < report.fingers_size() ? report.fingers(i) : absl::StrCat(i);
-      fingers.push_back(absl::StrCat(name, " ", SignedTime(report.finger_bias_us(i))));
-    }
-    out->Paragraph(absl::StrCat("Mean residual of the fingers: ", absl::StrJoin(fingers, ", "), "."));
+  for (const v1::DataReport& one : report.data()) {
+    const std::string fingers = FingerBiasWords(one);
+    if (!fingers.empty()) out->Paragraph(absl::StrCat("Mean residual of the fingers: ", fingers, "."));
   }
 }
 
 void AddWhere(const v1::Report& report, TextLayout* out) {
-  if (report.where().empty()) return;
-  out->Label("Where");
   std::vector<std::vector<TextCell>> rows;
-  for (int i = 0; i < std::min(report.where_size(), 6); ++i) {
-    const v1::Slice& slice = report.where(i);
-    const bool of_touches = slice.touches() > 0;  // a joint report has both
-    const ErrorScale scale(of_touches ? v1::Report() : report);
-    const std::string words = slice.words().empty()
-                                  ? absl::StrCat("mean residual ", scale.Signed(scale.Mean(slice)))
-                                  : slice.words();
-    rows.push_back(
-        {{slice.slice()},
-         {absl::StrCat(Count(scale.Readings(slice)), " ", scale.readings()), true},
-         {absl::StrCat(Share(slice.share_of_excess_error()), i == 0 ? " of the excess" : ""), false},
-         {words}});
-  }
-  // Right-align the shares though only the first says of what.
   size_t widest = 0;
-  for (const v1::Slice& slice : report.where()) {
-    widest = std::max(widest, Share(slice.share_of_excess_error()).size());
+  for (const v1::DataReport& data : report.data()) {
+    const ErrorScale scale(data);
+    for (const v1::Slice& slice : data.where()) {
+      if (rows.size() == 6) break;
+      const std::string words = slice.words().empty()
+                                    ? absl::StrCat("mean residual ", scale.Signed(slice.mean_residual()))
+                                    : slice.words();
+      const std::string share = Share(slice.share_of_excess_error());
+      widest = std::max(widest, share.size());
+      rows.push_back({{slice.slice()},
+                      {absl::StrCat(Count(slice.count()), " ", scale.readings()), true},
+                      {absl::StrCat(share, rows.empty() ? " of the excess" : ""), false},
+                      {words}});
+    }
   }
+  if (rows.empty()) return;
+  out->Label("Where");
+  // Right-align the shares though only the first says of what.
   for (auto& row : rows) row[2].text.insert(0, widest - std::min(widest, row[2].text.find(" %") + 2), ' ');
   out->Rows(rows);
 }
 
 // Whether the fingers' residuals depend on the place in the session, with the given and with the improved model.
 void AddSession(const v1::Report& report, TextLayout* out) {
-  const std::vector<const v1::CovariateCurve*> curves = SessionCurves(report);
+  std::vector<const v1::CovariateCurve*> curves;
+  for (const v1::DataReport& data : report.data())
+    for (const v1::CovariateCurve* curve : SessionCurves(data)) curves.push_back(curve);
   if (curves.empty()) return;
   const bool improved = !report.improved_model_yaml().empty();
   double smallest = 1;
@@ -125,7 +110,7 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
   const std::vector<Rung> rungs = Ladder(report);
   if (rungs.empty()) return;
   out->Label("Ladder");
-  const ErrorScale scale(report);
+  const ErrorScale scale(MainData(report));
   double largest = 0;
   int names = 0;
   bool heldout = false, p = false;
@@ -136,7 +121,7 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
     p |= !std::isnan(rung.lack_of_fit_p);
   }
   const bool wide = out->width() >= 96;
-  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11) - (scale.grey() ? 5 : 0), 10, 40);
+  const int bar = std::clamp(out->room() - names - 2 - (wide ? 35 : 11) - (scale.pictures() ? 5 : 0), 10, 40);
   std::vector<std::vector<TextCell>> rows;
   if (wide && (heldout || p)) {
     rows.push_back({{""},
@@ -175,8 +160,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddUnexplained(report, &out);
   AddLadder(report, &out);
   AddWhatToDo(report, &out);
-  AddNextTouches(report, &out);
-  AddNextPhotographs(report, &out);
+  AddNext(report, &out);
   AddUnusedRows(report, &out);
   return out.Take();
 }

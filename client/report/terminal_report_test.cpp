@@ -84,9 +84,10 @@ TEST(TerminalReport, ColoursOnlyWhenAsked) {
 
 TEST(TerminalReport, LadderBarsAreProportionalToTheErrors) {
   v1::Report report = MissingEffectsReport();
-  report.mutable_initial()->set_rmse_us(40000);
-  report.mutable_steps(0)->set_rmse_us(20000);
-  report.mutable_steps(1)->set_rmse_us(10000);
+  v1::DataReport& data = *report.mutable_data(0);
+  data.mutable_initial()->set_rmse(40000);
+  data.mutable_after_step(0)->set_rmse(20000);
+  data.mutable_after_step(1)->set_rmse(10000);
   report.mutable_steps(0)->clear_equivalent();
   const std::string text = TerminalReport(report, 140, false);
   const int full = Bars(LineWith(text, "nominal  "));
@@ -111,9 +112,9 @@ TEST(TerminalReport, NamesWhatTheDataCannotTellApartAndWhatWouldDecide) {
 
 TEST(TerminalReport, SaysWhatIsKnownOfARestWithoutAFormula) {
   v1::Report report = UnexplainedReport();
-  report.mutable_unexplained()->Clear();
+  report.mutable_data(0)->mutable_unexplained()->Clear();
   const std::string words = "In 30 % of the touches finger l reports 20 ms later.";
-  report.mutable_unexplained()->set_words(words);
+  report.mutable_data(0)->mutable_unexplained()->set_words(words);
   EXPECT_THAT(TerminalReport(report, 120, false), HasSubstr(words));
   EXPECT_THAT(HtmlReport(report), HasSubstr("In 30"));
 }
@@ -137,7 +138,7 @@ TEST(TerminalReport, CallsTheFloorAnUpperBoundWithoutRepeats) {
 TEST(TerminalReport, ShowsTheFormulaAsItCanBeAdded) {
   const v1::Report report = UnexplainedReport();
   const std::string text = TerminalReport(report, 80, false);
-  for (const std::string& line : Lines(report.unexplained().formula_yaml())) {
+  for (const std::string& line : Lines(report.data(0).unexplained().formula_yaml())) {
     EXPECT_THAT(text, HasSubstr(line));
   }
   EXPECT_THAT(text, HasSubstr("depends on travel (p 1e-9)"));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
@@ -24,15 +25,17 @@ std::string CovariateName(const std::string& name) {
 }
 
 std::string TimesTheFloor(const v1::Report& report) {
-  const Floor floor = NoiseFloorOf(report);
-  const ErrorScale scale(report);
-  const double ratio = floor.sigma > 0 ? scale.Rmse(report.initial()) / floor.sigma : 0;
+  const v1::DataReport& data = MainData(report);
+  const Floor floor = NoiseFloorOf(data);
+  const ErrorScale scale(data);
+  const double ratio = floor.sigma > 0 ? data.initial().rmse() / floor.sigma : 0;
   if (!(ratio > 0)) return "";
   if (ratio <= 1.02) return "no more than the floor";
   const std::string times = absl::StrCat(Number(ratio, 2), " times the floor");
-  const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(report.reducible_share()));
+  const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(data.reducible_share()));
   if (report.verdict() == v1::Report::CHECK_DATA) {
-    const double after = report.data_problems().empty() ? 0 : scale.After(report.data_problems(0));
+    const bool ours = !report.data_problems().empty() && &DataOf(report, report.data_problems(0)) == &data;
+    const double after = ours ? report.data_problems(0).error_after() : 0;
     return absl::StrCat(times, ", which says nothing of the model yet: the error is the file's",
                         after > 0 ? absl::StrCat(" but for ", scale.Text(after)) : "");
   }
@@ -43,17 +46,30 @@ std::string TimesTheFloor(const v1::Report& report) {
 
 std::string FingerScatterWords(const v1::Report& report) {
   // Beside a rest that nothing explains, fingers differ anyway.
-  if (!report.has_finger_scatter() || report.verdict() == v1::Report::UNEXPLAINED) return "";
-  const v1::FingerScatter& scatter = report.finger_scatter();
-  return absl::StrCat("the error that is left is ", Time(scatter.rmse_us()), " on finger ", scatter.finger(),
-                      " and ", Time(scatter.others_rmse_us()),
-                      " on the others: one noise for all fingers does not do that (p ",
-                      Probability(scatter.p()), ")");
+  if (report.verdict() == v1::Report::UNEXPLAINED) return "";
+  for (const v1::DataReport& data : report.data()) {
+    if (!data.has_finger_scatter()) continue;
+    const v1::FingerScatter& scatter = data.finger_scatter();
+    const ErrorScale scale(data);
+    return absl::StrCat("the error that is left is ", scale.Text(scatter.rmse()), " on finger ",
+                        scatter.finger(), " and ", scale.Text(scatter.others_rmse()),
+                        " on the others: one noise for all fingers does not do that (p ",
+                        Probability(scatter.p()), ")");
+  }
+  return "";
 }
 
-std::vector<const v1::CovariateCurve*> SessionCurves(const v1::Report& report) {
+std::string FingerBiasWords(const v1::DataReport& data) {
+  std::vector<std::string> fingers;
+  for (int i = 0; i < data.finger_bias_size(); ++i)
+    fingers.push_back(absl::StrCat(i < data.fingers_size() ? data.fingers(i) : absl::StrCat(i), " ",
+                                   ErrorScale(data).Signed(data.finger_bias(i))));
+  return absl::StrJoin(fingers, ", ");
+}
+
+std::vector<const v1::CovariateCurve*> SessionCurves(const v1::DataReport& data) {
   std::vector<const v1::CovariateCurve*> curves;
-  for (const v1::CovariateCurve& curve : report.curves())
+  for (const v1::CovariateCurve& curve : data.curves())
     if (!curve.fingers().empty()) curves.push_back(&curve);
   return curves;
 }
@@ -75,17 +91,14 @@ std::string RungName(const v1::Step& step) {
   return absl::StrCat(step.effect(), " or ", step.equivalent_size(), " others");
 }
 
-std::string VerdictTouches(const v1::ProposedTouch& touch) {
-  if (touch.touches_to_verdict() == 0) return "";
-  return absl::StrCat("about ", Count(touch.touches_to_verdict()),
-                      touch.touches_to_verdict() == 1 ? " such touch" : " such touches",
-                      " to a verdict (6 nats)");
-}
-
-std::string VerdictPictures(const v1::ProposedPhotograph& picture) {
-  const uint32_t count = picture.photographs_to_verdict();
+std::string CountToVerdict(const v1::NextMeasurement& next) {
+  const uint32_t count = next.count_to_verdict();
   if (count == 0) return "";
-  return absl::StrCat("about ", Count(count), count == 1 ? " such picture" : " such pictures",
+  const char* what = next.has_photograph() ? "picture" : "touch";
+  return absl::StrCat("about ", Count(count), " such ", what,
+                      count == 1              ? ""
+                      : next.has_photograph() ? "s"
+                                              : "es",
                       " to a verdict (6 nats)");
 }
 

@@ -102,10 +102,6 @@ std::string TimeChange(double from_us, double to_us) {
   return absl::StrCat(Fixed(from, decimals), " -> ", Fixed(to, decimals), " ", unit.symbol);
 }
 
-double UnseenError(double heldout_us, double rmse_us) {
-  return heldout_us > 0 ? heldout_us : rmse_us;
-}
-
 std::string Probability(double p) {
   if (std::isnan(p)) return "n/a";
   if (p < 1e-15) return "< 1e-15";
@@ -196,57 +192,96 @@ std::string StepName(const v1::Step& step) {
   return Join(names, "or");
 }
 
-Floor NoiseFloorOf(const v1::Report& report) {
-  Floor floor;
-  if (report.images() > 0)
-    floor.sigma =
-        report.noise_floor_grey() > 0 ? report.noise_floor_grey() : report.noise_floor().sigma_grey();
-  else
-    floor.sigma = report.noise_floor_us() > 0 ? report.noise_floor_us() : report.noise_floor().sigma_us();
-  floor.bound = report.has_noise_floor() && !report.noise_floor().from_repeats();
-  return floor;
+const v1::DataReport& MainData(const v1::Report& report) {
+  const auto& data = report.data();
+  const auto pictures = std::find_if(data.begin(), data.end(), [](const v1::DataReport& one) {
+    return one.kind() == v1::DataReport::PHOTOGRAPHS;
+  });
+  if (pictures != data.end()) return *pictures;
+  return data.empty() ? v1::DataReport::default_instance() : data[0];
 }
 
-std::string LengthOf(double us, const v1::Report& report) {
-  const auto& speeds = report.data().speeds_mm_s();
-  if (speeds.empty() || !(us > 0)) return "";
+const v1::DataReport& DataOf(const v1::Report& report, const v1::DataProblem& problem) {
+  const int index = static_cast<int>(problem.data_index());
+  return index < report.data_size() ? report.data(index) : v1::DataReport::default_instance();
+}
+
+bool IsJoint(const v1::Report& report) {
+  return report.data_size() > 1 &&
+         std::all_of(report.data().begin(), report.data().end(),
+                     [](const v1::DataReport& data) { return data.initial().rmse() > 0; });
+}
+
+std::string KindName(v1::DataReport::Kind kind) {
+  std::string name = absl::AsciiStrToLower(v1::DataReport::Kind_Name(kind));
+  if (!name.empty()) name[0] = absl::ascii_toupper(name[0]);
+  return name;
+}
+
+Floor NoiseFloorOf(const v1::DataReport& data) {
+  return {data.noise_floor(), data.has_noise() && !data.noise().from_repeats()};
+}
+
+namespace {
+
+// "5.00 ms (0.10 mm at 20 mm/s)", "2.10 grey (levels of 255)".
+std::string FloorWithLength(const v1::DataReport& data) {
+  const double us = data.noise_floor();
+  const std::string text = ErrorScale(data).Text(us);
+  if (data.kind() == v1::DataReport::PHOTOGRAPHS) return absl::StrCat(text, " (levels of 255)");
+  if (data.kind() == v1::DataReport::BOARDS)
+    return absl::StrCat(text, " (", Number(us / std::sqrt(2.0)), " px a coordinate)");
+  const auto& speeds = data.set().speeds_mm_s();
+  if (speeds.empty()) return text;
   const auto [slowest, fastest] = std::minmax_element(speeds.begin(), speeds.end());
   const std::string slow = Number(us * kSecondsPerMicrosecond * *slowest, 2),
                     fast = Number(us * kSecondsPerMicrosecond * *fastest, 2);
-  if (*slowest == *fastest) return absl::StrCat(slow, " mm at ", Tick(*slowest), " mm/s");
-  return absl::StrCat(slow, " to ", fast, " mm at ", Tick(*slowest), " to ", Tick(*fastest), " mm/s");
+  if (*slowest == *fastest) return absl::StrCat(text, " (", slow, " mm at ", Tick(*slowest), " mm/s)");
+  return absl::StrCat(text, " (", slow, " to ", fast, " mm at ", Tick(*slowest), " to ", Tick(*fastest),
+                      " mm/s)");
+}
+
+}  // namespace
+
+std::string NoiseFloorSentence(const v1::DataReport& data) {
+  const Floor floor = NoiseFloorOf(data);
+  if (!(floor.sigma > 0)) return "";
+  const uint32_t repeats = data.set().repeats();
+  return absl::StrCat(" Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data),
+                      floor.bound   ? ", an upper bound without repeats."
+                      : repeats > 0 ? absl::StrCat(", from ", Count(repeats), " repeats.")
+                                    : ".");
 }
 
 std::vector<Rung> Ladder(const v1::Report& report) {
   std::vector<Rung> rungs;
-  const ErrorScale scale(report);
-  if (!(scale.Rmse(report.initial()) > 0)) return rungs;
-  const auto add = [&](Rung::Kind kind, std::string name, double rmse, double heldout, double p) {
-    rungs.push_back({kind, std::move(name), rmse, heldout > 0 ? heldout : kUnknown, p});
+  const v1::DataReport& data = MainData(report);
+  const ErrorScale scale(data);
+  if (!(data.initial().rmse() > 0)) return rungs;
+  const auto add = [&](Rung::Kind kind, std::string name, const v1::Quality& quality) {
+    rungs.push_back({kind, std::move(name), quality.rmse(),
+                     quality.heldout_rmse() > 0 ? quality.heldout_rmse() : kUnknown,
+                     quality.lack_of_fit_p()});
   };
-  const v1::Quality& initial = report.initial();
-  add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), scale.Rmse(initial),
-      scale.Heldout(initial), initial.lack_of_fit_p());
-  if (report.steps().empty() && !report.refitted().empty()) {
-    add(Rung::kRefit, "refitted values", scale.Rmse(report.final()), scale.Heldout(report.final()),
-        report.final().lack_of_fit_p());
-  }
-  for (const v1::Step& step : report.steps()) {
-    add(Rung::kStep, absl::StrCat("+ ", RungName(step)), scale.Rmse(step), scale.Heldout(step),
-        step.lack_of_fit_p());
-  }
-  if (!report.data_problems().empty() && scale.After(report.data_problems(0)) > 0)
-    add(Rung::kSuggestion, absl::StrCat("with the ", scale.grey() ? "set" : "file", " fixed"),
-        scale.After(report.data_problems(0)), kUnknown, kUnknown);
-  const v1::Unexplained& rest = report.unexplained();
-  if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && scale.Rmse(rest) > 0) {
-    add(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula", scale.Rmse(rest),
-        scale.Heldout(rest), kUnknown);
-  }
-  const Floor floor = NoiseFloorOf(report);
-  if (floor.sigma > 0) {
-    add(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma, kUnknown, kUnknown);
-  }
+  const auto suggest = [&](Rung::Kind kind, std::string name, double rmse, double heldout) {
+    rungs.push_back({kind, std::move(name), rmse, heldout > 0 ? heldout : kUnknown, kUnknown});
+  };
+  add(Rung::kGiven, report.model_name().empty() ? "given model" : report.model_name(), data.initial());
+  if (report.steps().empty() && !report.refitted().empty())
+    add(Rung::kRefit, "refitted values", data.final());
+  for (int i = 0; i < std::min(report.steps_size(), data.after_step_size()); ++i)
+    add(Rung::kStep, absl::StrCat("+ ", RungName(report.steps(i))), data.after_step(i));
+  if (!report.data_problems().empty() && &DataOf(report, report.data_problems(0)) == &data &&
+      report.data_problems(0).error_after() > 0)
+    suggest(Rung::kSuggestion, absl::StrCat("with the ", scale.pictures() ? "set" : "file", " fixed"),
+            report.data_problems(0).error_after(), kUnknown);
+  const v1::Unexplained& rest = data.unexplained();
+  if ((!rest.formula().empty() || !rest.lookup_yaml().empty()) && rest.rmse() > 0)
+    suggest(Rung::kSuggestion, rest.formula().empty() ? "+ curve" : "+ suggested formula", rest.rmse(),
+            rest.heldout_rmse());
+  const Floor floor = NoiseFloorOf(data);
+  if (floor.sigma > 0)
+    suggest(Rung::kFloor, floor.bound ? "noise floor, at most" : "noise floor", floor.sigma, kUnknown);
   return rungs;
 }
 
@@ -274,24 +309,24 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 std::string SummaryToShow(const v1::Report& report) {
   // Their own part says it at more length.
   if (!report.data_problems().empty()) return "";
-  return ErrorScale(report).Rmse(report.initial()) > 0 ? "" : report.summary();
+  // Of boards it counts corners.
+  const v1::DataReport& data = MainData(report);
+  return data.initial().rmse() > 0 && data.kind() != v1::DataReport::BOARDS ? "" : report.summary();
 }
 
 std::string DataInWords(const v1::Report& report, const std::string& times) {
-  const v1::DataSummary& data = report.data();
   std::string text;
-  if (report.images() == 0 || report.touches() > 0)
-    text = absl::StrCat(Count(report.touches()), report.touches() == 1 ? " touch" : " touches");
-  if (report.images() > 0)
-    absl::StrAppend(&text, text.empty() ? "" : " and ", Count(report.images()),
-                    report.images() == 1 ? " picture" : " pictures");
-  if (data.objects_size() > 0) {
-    absl::StrAppend(&text, ", ", data.objects_size(), data.objects_size() == 1 ? " object" : " objects");
-  }
-  if (data.poses() > 0)
-    absl::StrAppend(&text, ", ", Count(data.poses()), data.poses() == 1 ? " pose" : " poses");
-  if (data.poses() > 0 && data.rounds() > 1)
-    absl::StrAppend(&text, " ", times, " ", data.rounds(), " rounds");
+  for (const v1::DataReport& data : report.data())
+    absl::StrAppend(&text, text.empty() ? "" : " and ", Count(data.count()), " ",
+                    ErrorScale(data).Counted(data.count()));
+  if (report.data().empty()) return "0 touches";
+  // Of a joint report the touches' set.
+  const v1::DataSummary& set = report.data(0).set();
+  if (set.objects_size() > 0)
+    absl::StrAppend(&text, ", ", set.objects_size(), set.objects_size() == 1 ? " object" : " objects");
+  if (set.poses() > 0)
+    absl::StrAppend(&text, ", ", Count(set.poses()), set.poses() == 1 ? " pose" : " poses");
+  if (set.poses() > 0 && set.rounds() > 1) absl::StrAppend(&text, " ", times, " ", set.rounds(), " rounds");
   return text;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/report/error_scale.h"
 #include "client/report/report.h"
 #include "client/report/sample_reports.h"
 
@@ -97,8 +98,10 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
 TEST(Headline, NamesWhatTheDataDoWithout) {
   v1::Report report;
   report.set_verdict(v1::Report::WRONG_VALUES);
-  report.mutable_initial()->set_rmse_us(5000);
-  report.mutable_final()->set_rmse_us(5000);
+  v1::DataReport* data = report.add_data();
+  data->set_kind(v1::DataReport::TOUCHES);
+  data->mutable_initial()->set_rmse(5000);
+  data->mutable_final()->set_rmse(5000);
   EXPECT_EQ(Headline(report), "No effect is missing, but the noise is not what the model says.");
   report.add_superfluous("poll_interval");
   EXPECT_EQ(Headline(report), "No effect is missing, but the data do without poll_interval.");
@@ -108,9 +111,11 @@ TEST(Headline, OfAMapOfTheSurfaceSaysWhatItIsWorthOnUnseenTouches) {
   v1::Report report;
   report.set_verdict(v1::Report::MISSING_EFFECTS);
   report.add_steps()->set_effect("surface_map");
-  report.mutable_initial()->set_rmse_us(5510);
-  report.mutable_final()->set_rmse_us(4600);
-  report.mutable_final()->set_heldout_rmse_us(5450);
+  v1::DataReport* data = report.add_data();
+  data->set_kind(v1::DataReport::TOUCHES);
+  data->mutable_initial()->set_rmse(5510);
+  data->mutable_final()->set_rmse(4600);
+  data->mutable_final()->set_heldout_rmse(5450);
   EXPECT_EQ(Headline(report),
             "The model lacks surface_map; on unseen touches the error falls from 5.51 ms to 5.45 ms.");
 }
@@ -119,7 +124,7 @@ TEST(Headline, TellsOfDistributionsWithNoiseThatTheModelLacks) {
   v1::Report report = WithoutPosesReport();
   report.set_verdict(v1::Report::MISSING_EFFECTS);
   report.add_steps()->set_effect("gaussian_noise");
-  report.mutable_distributions()->set_p(0.4);
+  report.mutable_data(0)->mutable_distributions()->set_p(0.4);
   EXPECT_EQ(Headline(report),
             "The model lacks gaussian_noise; with it, measured and simulated touches cannot be told apart as "
             "distributions (p = 0.40).");
@@ -157,26 +162,33 @@ TEST(JsonReport, HasTheKeysThatOthersRelyOn) {
     const auto text = JsonReport(sample.report);
     ASSERT_TRUE(text.ok()) << text.status();
     const nlohmann::json json = nlohmann::json::parse(*text);
-    for (const char* key : {"verdict", "touches", "noise_floor_us", "initial", "refitted", "steps", "final",
-                            "where", "unexplained", "next_touches"}) {
+    for (const char* key : {"verdict", "data_problems", "superfluous", "refitted", "steps", "data", "next"})
       EXPECT_TRUE(json.contains(key)) << sample.name << " " << key;
+    EXPECT_EQ(json["data"].size(), sample.report.data().empty() ? 0u : 1u) << sample.name;
+    for (const nlohmann::json& data : json["data"]) {
+      for (const char* key : {"kind", "unit", "session", "emulated", "count", "noise_floor", "initial",
+                              "after_step", "final", "where", "unexplained"})
+        EXPECT_TRUE(data.contains(key)) << sample.name << " " << key;
+      for (const char* key : {"rmse", "heldout_rmse", "lack_of_fit_p"}) {
+        EXPECT_TRUE(data["initial"][key].is_number()) << sample.name << " " << key;
+        EXPECT_TRUE(data["final"][key].is_number()) << sample.name << " " << key;
+      }
+      EXPECT_EQ(data["after_step"].size(), json["steps"].size());
+      EXPECT_TRUE(data["unexplained"]["covariates"].is_array());
+      EXPECT_TRUE(data["unexplained"]["formula"].is_string());
     }
-    for (const char* key : {"rmse_us", "heldout_rmse_us", "lack_of_fit_p"}) {
-      EXPECT_TRUE(json["initial"][key].is_number()) << sample.name << " " << key;
-      EXPECT_TRUE(json["final"][key].is_number()) << sample.name << " " << key;
-    }
-    EXPECT_TRUE(json["unexplained"]["covariates"].is_array());
-    EXPECT_TRUE(json["unexplained"]["formula"].is_string());
   }
 }
 
 TEST(JsonReport, WritesStepsAsTheDesignShowsThem) {
   const nlohmann::json json = nlohmann::json::parse(*JsonReport(MissingEffectsReport()));
   EXPECT_EQ(json["verdict"], "MISSING_EFFECTS");
-  EXPECT_EQ(json["touches"], 960);
+  EXPECT_EQ(json["data"][0]["kind"], "TOUCHES");
+  EXPECT_EQ(json["data"][0]["count"], 960);
   const nlohmann::json& step = json["steps"][0];
   EXPECT_EQ(step["effect"], "tip_radius");
   EXPECT_EQ(step["equivalent"], nlohmann::json({"surface_offset"}));
+  EXPECT_EQ(step["scope"]["kind"], "RIG");
   EXPECT_EQ(json["steps"][1]["equivalent"], nlohmann::json::array());
   EXPECT_EQ(step["parameters"][0]["name"], "radius_mm");
   EXPECT_DOUBLE_EQ(step["parameters"][0]["std_error"], 0.021);
@@ -185,18 +197,18 @@ TEST(JsonReport, WritesStepsAsTheDesignShowsThem) {
 
 TEST(JsonReport, IsValidJsonWhereNumbersAreNotKnown) {
   v1::Report report = MissingEffectsReport();
-  report.mutable_initial()->set_lack_of_fit_p(std::nan(""));
+  report.mutable_data(0)->mutable_initial()->set_lack_of_fit_p(std::nan(""));
   const nlohmann::json json = nlohmann::json::parse(*JsonReport(report));
-  EXPECT_EQ(json["initial"]["lack_of_fit_p"], "NaN");
+  EXPECT_EQ(json["data"][0]["initial"]["lack_of_fit_p"], "NaN");
 }
 
 TEST(Headline, OfAnAdequateModelNamesAFingerThatScattersOtherwise) {
   v1::Report report = AdequateReport();
   EXPECT_THAT(Headline(report), HasSubstr("Nothing is missing"));
-  v1::FingerScatter& scatter = *report.mutable_finger_scatter();
+  v1::FingerScatter& scatter = *report.mutable_data(0)->mutable_finger_scatter();
   scatter.set_finger("m");
-  scatter.set_rmse_us(2500);
-  scatter.set_others_rmse_us(5100);
+  scatter.set_rmse(2500);
+  scatter.set_others_rmse(5100);
   scatter.set_p(1e-12);
   EXPECT_THAT(Headline(report), Not(HasSubstr("Nothing is missing")));
   EXPECT_THAT(Headline(report), HasSubstr("2.50 ms on finger m and 5.10 ms on the others"));
@@ -215,20 +227,30 @@ TEST(CovariateName, IsInWords) {
   EXPECT_EQ(CovariateName("approach_z"), "approach_z");
 }
 
-TEST(VerdictPictures, SayHowManyAreNeeded) {
-  v1::ProposedPhotograph picture;
-  EXPECT_EQ(VerdictPictures(picture), "");
-  picture.set_photographs_to_verdict(1);
-  EXPECT_EQ(VerdictPictures(picture), "about 1 such picture to a verdict (6 nats)");
-  picture.set_photographs_to_verdict(3);
-  EXPECT_EQ(VerdictPictures(picture), "about 3 such pictures to a verdict (6 nats)");
+TEST(CountToVerdict, SaysHowManyAreNeeded) {
+  v1::NextMeasurement touch, picture;
+  touch.mutable_touch();
+  picture.mutable_photograph();
+  EXPECT_EQ(CountToVerdict(picture), "");
+  picture.set_count_to_verdict(1);
+  EXPECT_EQ(CountToVerdict(picture), "about 1 such picture to a verdict (6 nats)");
+  picture.set_count_to_verdict(3);
+  EXPECT_EQ(CountToVerdict(picture), "about 3 such pictures to a verdict (6 nats)");
+  touch.set_count_to_verdict(9);
+  EXPECT_EQ(CountToVerdict(touch), "about 9 such touches to a verdict (6 nats)");
 }
 
-TEST(VerdictTouches, SaysHowManyAreNeeded) {
-  v1::ProposedTouch touch;
-  EXPECT_EQ(VerdictTouches(touch), "");
-  touch.set_touches_to_verdict(9);
-  EXPECT_EQ(VerdictTouches(touch), "about 9 such touches to a verdict (6 nats)");
+TEST(ErrorScale, WritesErrorsInTheUnitOfTheKind) {
+  v1::DataReport touches, photographs, boards;
+  photographs.set_kind(v1::DataReport::PHOTOGRAPHS);
+  boards.set_kind(v1::DataReport::BOARDS);
+  EXPECT_EQ(ErrorScale(touches).Text(41000), "41.0 ms");
+  EXPECT_EQ(ErrorScale(photographs).Text(12.34), "12.3 grey");
+  EXPECT_EQ(ErrorScale(boards).Text(0.1234), "0.123 px");
+  EXPECT_EQ(ErrorScale(photographs).Signed(3.2), "+3.20 grey");
+  EXPECT_EQ(ErrorScale(boards).Change(1.234, 0.2), "1.23 -> 0.200 px");
+  EXPECT_STREQ(ErrorScale(touches).readings(), "touches");
+  EXPECT_STREQ(ErrorScale(boards).Counted(1), "picture");
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// How wrong is a model, where, why, and what to do. Residuals are measured minus simulated for the same commanded
-// touch, differences between fingers only; the noise floor is the error that repeats have among themselves.
+// How wrong is a model, where, why, and what to do, whatever was measured: touches, touches without poses, photographs, or
+// touches and photographs of one session together. Residuals are measured minus simulated for the same command; the noise
+// floor is the error that repeats have among themselves.
 //
 // The three calls are pure functions of their input: the same input gives the same result, durations aside, whatever
 // the number of threads. They never fail because the data are poor: they say what the data can tell. They fail on
@@ -19,9 +20,9 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const Dia
 // Also why, what to add, and what the error becomes.
 absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context);
 
-// Diagnose, with at most `max_touches` further touches that would tell the explanations that are left apart, or
-// improve the values where only one is left.
-absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_touches,
+// Diagnose, with at most `max_measurements` further touches, or pictures, that would tell the explanations that are left
+// apart, or improve the values where only one is left. Of touches or of photographs: INVALID_ARGUMENT for both.
+absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_measurements,
                                           const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis

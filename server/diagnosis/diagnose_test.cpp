@@ -27,7 +27,7 @@ report::Diagnosis DiagnoseRig(const touches::HiddenRig& rig) {
 
 std::vector<std::string> StepNames(const report::Diagnosis& report) {
   std::vector<std::string> names;
-  for (const engine::LadderStep& step : report.steps) names.push_back(step.effect);
+  for (const report::Step& step : report.steps) names.push_back(step.effect);
   return names;
 }
 
@@ -35,9 +35,9 @@ TEST(Diagnose, FindsNothingWhereNothingIsHidden) {
   const report::Diagnosis report = DiagnoseRig({});
   EXPECT_EQ(report.verdict, engine::Verdict::kAdequate) << report.summary;
   EXPECT_EQ(report.steps.size(), 0u);
-  EXPECT_NEAR(report.noise_floor->sigma, 2000e-6, 150e-6);
-  EXPECT_GT(report.initial->lack_of_fit_p, 0.001);
-  EXPECT_TRUE(report.improved_model_yaml.empty());
+  EXPECT_NEAR(report.data[0].noise_floor->sigma, 2000, 150);
+  EXPECT_GT(report.data[0].initial->lack_of_fit_p, 0.001);
+  EXPECT_FALSE(report.improved_model);
 }
 
 // The first rows of a set.
@@ -57,10 +57,10 @@ TEST(Diagnose, SaysThatAFewTouchesAreTooLittleAndHowManyWouldDo) {
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData) << count;
     // 31 contrasts are 16 touches, and more where fingers stay silent.
-    EXPECT_GE(report->touches_needed, 16) << count;
-    EXPECT_LE(report->touches_needed, 20) << count;
+    EXPECT_GE(report->data[0].needed, 16) << count;
+    EXPECT_LE(report->data[0].needed, 20) << count;
     EXPECT_TRUE(report->steps.empty());
-    EXPECT_TRUE(report->improved_model_yaml.empty());
+    EXPECT_FALSE(report->improved_model);
     EXPECT_THAT(report->summary, HasSubstr(" usable touches would do"));
   }
   const absl::StatusOr<report::Diagnosis> enough = Diagnose(FirstTouches(24, rig), {});
@@ -77,8 +77,8 @@ TEST(Diagnose, NeverCallsAModelGoodThatNoTouchWasComparedWith) {
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData);
-  EXPECT_EQ(report->data.touches, 0);
-  EXPECT_EQ(report->touches_needed, 16);
+  EXPECT_EQ(report->data[0].count, 0);
+  EXPECT_EQ(report->data[0].needed, 16);
 }
 
 TEST(Diagnose, ChecksTheFileBeforeThePhysics) {
@@ -90,7 +90,7 @@ TEST(Diagnose, ChecksTheFileBeforeThePhysics) {
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->verdict, engine::Verdict::kCheckData);
   ASSERT_FALSE(report->data_problems.empty());
-  EXPECT_EQ(report->data_problems[0].kind, "units_time");
+  EXPECT_EQ(report->data_problems[0].kind, engine::ProblemKind::kUnitsTime);
   EXPECT_TRUE(report->steps.empty());
   EXPECT_FALSE(Compare(input, {}).ok());
 }
@@ -102,7 +102,7 @@ TEST(Propose, StillProposesWhereThereIsTooLittleForAVerdict) {
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->verdict, engine::Verdict::kTooLittleData);
   // Touches, or the reason why there are none.
-  EXPECT_TRUE(!report->next_touches.empty() ||
+  EXPECT_TRUE(!report->next.empty() ||
               std::any_of(report->warnings.begin(), report->warnings.end(), [](const std::string& warning) {
                 return warning.rfind("No touch would tell", 0) == 0;
               }));
@@ -118,13 +118,14 @@ TEST(Diagnose, NamesTheRadiusAndTheErrorFallsToTheFloor) {
   const engine::ParameterEstimate& radius = report.steps[0].parameters[0];
   EXPECT_NEAR(radius.value, 1.5, 4 * radius.std_error);
   EXPECT_LT(radius.std_error, 0.05);
-  EXPECT_LT(report.final->rmse, 1.06 * report.noise_floor->sigma);
-  EXPECT_GT(report.initial->rmse, 3 * report.noise_floor->sigma);
-  // The improved model is a file that holds the effect.
+  EXPECT_LT(report.data[0].final->rmse, 1.06 * report.data[0].noise_floor->sigma);
+  EXPECT_GT(report.data[0].initial->rmse, 3 * report.data[0].noise_floor->sigma);
+  // The improved model can be written as a file, which holds the effect.
+  ASSERT_TRUE(report.improved_model);
   const absl::StatusOr<model::Model> better =
-      model::ParseModel(report.improved_model_yaml, "better", effects::Catalogue());
+      model::ParseModel(model::FormatModel(*report.improved_model), "better", effects::Catalogue());
   ASSERT_TRUE(better.ok()) << better.status();
-  EXPECT_EQ(better->Hash(), report.improved_model_hash);
+  EXPECT_EQ(better->Hash(), report.improved_model->Hash());
   EXPECT_EQ(better->effects.back().effect->name, "tip_radius");
 }
 
@@ -138,10 +139,8 @@ TEST(Diagnose, LeavesTheModelsEffectsOfPhotographsAsTheyAre) {
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->model_hash, input.model->Hash());
   EXPECT_EQ(StepNames(*report), std::vector<std::string>{"tip_radius"});
-  const absl::StatusOr<model::Model> improved =
-      model::ParseModel(report->improved_model_yaml, "better", effects::Catalogue());
-  ASSERT_TRUE(improved.ok()) << improved.status();
-  EXPECT_EQ(improved->Hash(), report->improved_model_hash);
+  const std::optional<model::Model>& improved = report->improved_model;
+  ASSERT_TRUE(improved);
   int kept = 0;
   for (const model::EffectInstance& instance : improved->effects) {
     kept += instance.effect->name == "exposure" && instance.values[0] == 0.25;
@@ -190,14 +189,14 @@ TEST(Diagnose, AdmitsThatNothingOfTheCatalogueFitsAndSuggestsAFormula) {
                   "k_min=-1", "k_max=1"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
   EXPECT_EQ(report.verdict, engine::Verdict::kUnexplained) << report.summary;
-  ASSERT_GE(report.unexplained->covariates.size(), 1u);
-  EXPECT_EQ(report.unexplained->covariates[0].name, "approach_z");
-  EXPECT_THAT(report.unexplained->formula, HasSubstr("approach_z"));
-  EXPECT_GT(report.unexplained->heldout_gain, 0.5);
+  ASSERT_GE(report.data[0].unexplained->covariates.size(), 1u);
+  EXPECT_EQ(report.data[0].unexplained->covariates[0].name, "approach_z");
+  EXPECT_THAT(report.data[0].unexplained->formula, HasSubstr("approach_z"));
+  EXPECT_GT(report.data[0].unexplained->heldout_gain, 0.5);
   // The formula can be added as it stands.
   const std::string yaml =
       "touchstone: model/1\nname: m\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n" +
-      report.unexplained->formula_yaml;
+      report.data[0].unexplained->formula_yaml;
   EXPECT_TRUE(model::ParseModel(yaml, "formula", effects::Catalogue()).ok()) << yaml;
 }
 
@@ -257,8 +256,8 @@ TEST(Diagnose, SaysThatNoiseOfTheModelIsNotThere) {
   const report::Diagnosis report = DiagnoseRig(rig);
   EXPECT_EQ(report.verdict, engine::Verdict::kWrongValues) << report.summary;
   EXPECT_THAT(report.superfluous, testing::UnorderedElementsAre("poll_interval", "heavy_tail_noise"));
-  EXPECT_THAT(report.improved_model_yaml, testing::Not(HasSubstr("poll_interval")));
-  EXPECT_THAT(report.improved_model_yaml, HasSubstr("gaussian_noise"));
+  EXPECT_THAT(model::FormatModel(report.improved_model.value()), testing::Not(HasSubstr("poll_interval")));
+  EXPECT_THAT(model::FormatModel(report.improved_model.value()), HasSubstr("gaussian_noise"));
 }
 
 TEST(Diagnose, KeepsNoiseOfTheModelThatIsThere) {
@@ -289,7 +288,8 @@ TEST(Diagnose, ALoudFingerIsNoHeavyTail) {
 TEST(Diagnose, ASigmaThatIsOffByAFactorIsAWrongValueAndOneThatIsNearIsEstimatedAnew) {
   for (const auto& [declared_us, verdict] :
        {std::pair(900.0, engine::Verdict::kWrongValues), std::pair(1500.0, engine::Verdict::kAdequate),
-        std::pair(2700.0, engine::Verdict::kAdequate), std::pair(6000.0, engine::Verdict::kWrongValues)}) {
+        std::pair(2700.0, engine::Verdict::kAdequate),
+        std::pair(6000.0, engine::Verdict::kWrongValues)}) {
     DiagnosisInput input = touches::MakeTestInput({});
     input.model = std::make_shared<const model::Model>(touches::WithEffects(
         model::NominalModel(), {{"gaussian_noise", {absl::StrCat("sigma_us=", declared_us)}}}));
@@ -370,7 +370,7 @@ TEST(Diagnose, NamesAMeshInAnotherUnitThatACompareRefuses) {
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_EQ(report->verdict, engine::Verdict::kCheckData) << scale;
     ASSERT_EQ(report->data_problems.size(), 1u);
-    EXPECT_EQ(report->data_problems[0].kind, "units_length");
+    EXPECT_EQ(report->data_problems[0].kind, engine::ProblemKind::kUnitsLength);
     EXPECT_THAT(report->data_problems[0].detail, HasSubstr("lat10"));
   }
 }
@@ -387,7 +387,8 @@ TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
     input.set = set;
     const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict, touches < 16 ? engine::Verdict::kTooLittleData : engine::Verdict::kAdequate)
+    EXPECT_EQ(report->verdict,
+              touches < 16 ? engine::Verdict::kTooLittleData : engine::Verdict::kAdequate)
         << touches << ": " << report->summary;
     EXPECT_GE(report->warnings.size(), 1u);
   }
@@ -401,9 +402,9 @@ TEST(Diagnose, SurvivesASetInWhichNoFingerReported) {
   input.set = set;
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_EQ(report->data.touches, 0);
-  ASSERT_EQ(report->data.unused.size(), 1u);
-  EXPECT_EQ(report->data.unused.begin()->second.count, set->size());
+  EXPECT_EQ(report->data[0].count, 0);
+  ASSERT_EQ(report->data[0].set_aside.rows.size(), 1u);
+  EXPECT_EQ(report->data[0].set_aside.count(), set->size());
 }
 
 TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
@@ -411,8 +412,9 @@ TEST(Propose, NamesTouchesOfOtherSpeedsWhereLatencyAndLengthFitAlike) {
   rig.hidden = {{"channel_latency", {"latency_us=9000,-3000,-6000"}}};
   const absl::StatusOr<report::Diagnosis> report = Propose(touches::MakeTestInput(rig), 12, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  ASSERT_EQ(report->next_touches.size(), 12u);
-  for (const design::ProposedTouch& touch : report->next_touches) {
+  ASSERT_EQ(report->next.size(), 12u);
+  for (const report::NextMeasurement& next : report->next) {
+    const auto& touch = std::get<design::ProposedTouch>(next);
     EXPECT_GT(std::abs(touch.touch.speed_m_s - 0.02), 0.005);
     EXPECT_GT(touch.separation_sigmas, 0);
     EXPECT_FALSE(touch.purpose.empty());
@@ -425,7 +427,7 @@ TEST(Propose, NamesTouchesEvenWhereNothingIsAmbiguous) {
   rig.hidden = rig.known;
   const absl::StatusOr<report::Diagnosis> report = Propose(touches::MakeTestInput(rig), 5, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_TRUE(report->next_touches.size() == 5 || report->warnings.size() > 0);
+  EXPECT_TRUE(report->next.size() == 5 || report->warnings.size() > 0);
 }
 
 TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
@@ -435,18 +437,18 @@ TEST(Compare, TellsHowWrongTheModelIsAndWhere) {
   const absl::StatusOr<report::Diagnosis> report = Compare(touches::MakeTestInput(rig), {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->verdict, engine::Verdict::kNone);
-  EXPECT_NEAR(report->noise_floor->sigma, 2000e-6, 200e-6);
-  EXPECT_GT(report->reducible_share, 0.9);
-  ASSERT_GE(report->residuals.slices.size(), 1u);
-  EXPECT_EQ(report->residuals.slices[0].conditions, "finger = l");
-  EXPECT_EQ(report->data.fingers, 3);
+  EXPECT_NEAR(report->data[0].noise_floor->sigma, 2000, 200);
+  EXPECT_GT(report->data[0].reducible_share, 0.9);
+  ASSERT_GE(report->data[0].where.size(), 1u);
+  EXPECT_EQ(report->data[0].where[0].conditions, "finger = l");
+  EXPECT_EQ(report->data[0].fingers.size(), 3u);
 }
 
 double ComparedRmse(DiagnosisInput input, const model::Model& model) {
   input.model = std::make_shared<const model::Model>(model);
   const absl::StatusOr<report::Diagnosis> compared = Compare(input, {});
   EXPECT_TRUE(compared.ok()) << compared.status();
-  return compared.ok() && compared->initial ? compared->initial->rmse : NAN;
+  return compared.ok() && compared->data[0].initial ? compared->data[0].initial->rmse : NAN;
 }
 
 // Every error of the ladder against what a comparison with that step's model finds.
@@ -454,16 +456,15 @@ void ExpectErrorsAsCompared(const touches::HiddenRig& rig) {
   const DiagnosisInput input = touches::MakeTestInput(rig);
   const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
   ASSERT_TRUE(report.ok()) << report.status();
-  EXPECT_NEAR(report->initial->rmse / ComparedRmse(input, *input.model), 1, 0.01);
-  for (const engine::LadderStep& step : report->steps) {
+  EXPECT_NEAR(report->data[0].initial->rmse / ComparedRmse(input, *input.model), 1, 0.01);
+  ASSERT_EQ(report->data[0].after_step.size(), report->steps.size());
+  for (size_t i = 0; i < report->steps.size(); ++i) {
+    const report::Step& step = report->steps[i];
     if (step.model.effects.empty()) continue;  // noise: it changes no expectation
-    EXPECT_NEAR(step.quality.rmse / ComparedRmse(input, step.model), 1, 0.01) << step.effect;
+    EXPECT_NEAR(report->data[0].after_step[i].rmse / ComparedRmse(input, step.model), 1, 0.01) << step.effect;
   }
-  if (report->improved_model_yaml.empty()) return;
-  const absl::StatusOr<model::Model> better =
-      model::ParseModel(report->improved_model_yaml, "better", effects::Catalogue());
-  ASSERT_TRUE(better.ok()) << better.status();
-  EXPECT_NEAR(report->final->rmse / ComparedRmse(input, *better), 1, 0.01);
+  if (!report->improved_model) return;
+  EXPECT_NEAR(report->data[0].final->rmse / ComparedRmse(input, *report->improved_model), 1, 0.01);
 }
 
 TEST(Diagnose, FindsTheErrorsThatAComparisonFinds) {
@@ -482,8 +483,8 @@ TEST(Diagnose, ClaimsNoFallForASurfaceErrorThatNobodyKnows) {
   const report::Diagnosis report = DiagnoseRig(rig);
   ASSERT_EQ(StepNames(report), std::vector<std::string>{"surface_error"}) << report.summary;
   EXPECT_EQ(report.verdict, engine::Verdict::kMissingEffects);
-  EXPECT_EQ(report.steps[0].quality.rmse, report.initial->rmse);
-  EXPECT_EQ(report.final->rmse, report.initial->rmse);
+  EXPECT_EQ(report.data[0].after_step[0].rmse, report.data[0].initial->rmse);
+  EXPECT_EQ(report.data[0].final->rmse, report.data[0].initial->rmse);
   EXPECT_THAT(report.steps[0].words, HasSubstr("at poses left out"));
 }
 
@@ -525,16 +526,17 @@ TEST(Diagnose, CallsAnEffectSuperfluousAndTakesItOut) {
   const report::Diagnosis report = DiagnoseRig(rig);
   EXPECT_THAT(report.superfluous, Contains("object_push")) << report.summary;
   EXPECT_TRUE(report.refitted.empty()) << report.summary;
-  EXPECT_THAT(report.improved_model_yaml, ::testing::Not(HasSubstr("object_push")));
-  EXPECT_NEAR(report.final->rmse, report.noise_floor->sigma, 0.1 * report.noise_floor->sigma);
+  EXPECT_THAT(model::FormatModel(report.improved_model.value()), ::testing::Not(HasSubstr("object_push")));
+  EXPECT_NEAR(report.data[0].final->rmse, report.data[0].noise_floor->sigma,
+              0.1 * report.data[0].noise_floor->sigma);
 }
 
 TEST(Diagnose, IsNeverCertain) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  for (const engine::LadderStep& step : report.steps) EXPECT_LE(step.probability, engine::kMaxProbability);
-  for (const engine::RankedCandidate& candidate : report.candidates)
+  for (const report::Step& step : report.steps) EXPECT_LE(step.probability, engine::kMaxProbability);
+  for (const report::Candidate& candidate : report.data[0].candidates)
     EXPECT_LE(candidate.probability, engine::kMaxProbability);
 }
 

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -29,7 +29,7 @@ report::Diagnosis ReportOf(const selection::Workspace& workspace) {
 }  // namespace
 
 report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
-                                  std::vector<engine::DataProblem> problems) {
+                                  const std::vector<engine::DataProblem>& problems) {
   report::Diagnosis diagnosis;
   const auto workspace = selection::MakeWorkspace(input, context);
   if (workspace.ok()) {
@@ -38,12 +38,16 @@ report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisCo
     // The mistake makes the file contradict the meshes or the units, which would be an error without it.
     diagnosis.model_name = input.model->name;
     diagnosis.model_hash = input.model->Hash();
-    if (const auto o = touches::MakeObservations(input); o.ok()) diagnosis.data = touches::SummarizeData(*o);
-    const double before_s = problems.empty() ? NAN : problems[0].error_before;
-    if (before_s > 0) diagnosis.initial = diagnosis.final = engine::Quality{before_s, before_s, 0};
+    const auto o = touches::MakeObservations(input);
+    diagnosis.data = {o.ok() ? DataOf(*o, input) : report::DataReport()};
+    diagnosis.data[0].session = input.set->origin;
+    const double before_s = problems.empty() ? NAN : problems[0].rmse_before_s;
+    if (before_s > 0)
+      diagnosis.data[0].initial = diagnosis.data[0].final = report::QualityOf({before_s, before_s, 0});
   }
   diagnosis.verdict = engine::Verdict::kCheckData;
-  diagnosis.data_problems = std::move(problems);
+  for (const engine::DataProblem& problem : problems)
+    diagnosis.data_problems.push_back(report::DataProblemOfTouches(problem));
   diagnosis.summary = report::Summarize(diagnosis);
   return diagnosis;
 }
@@ -73,8 +77,8 @@ int TouchesNeeded(const touches::Observations& o) {
 report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int touches_needed) {
   report::Diagnosis diagnosis = ReportOf(workspace);
   diagnosis.verdict = engine::Verdict::kTooLittleData;
-  diagnosis.touches_needed = touches_needed;
-  for (std::string& warning : report::DataWarnings(diagnosis.data))
+  diagnosis.data[0].needed = touches_needed;
+  for (std::string& warning : report::DataWarnings(diagnosis.data[0]))
     diagnosis.warnings.push_back(std::move(warning));
   diagnosis.summary = report::Summarize(diagnosis);
   return diagnosis;

@@ -10,7 +10,7 @@ namespace touchstone::diagnosis {
 
 // kCheckData: how wrong the model is on the file as it stands, and the mistakes; no step.
 report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
-                                  std::vector<engine::DataProblem> problems);
+                                  const std::vector<engine::DataProblem>& problems);
 
 // How many usable touches a verdict needs if there are too few of them; 0: there are enough.
 int TouchesNeeded(const touches::Observations& observations);

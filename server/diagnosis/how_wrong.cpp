@@ -1,35 +1,37 @@
 #include "server/diagnosis/how_wrong.h"
 
-#include <algorithm>
-
+#include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
+#include "server/session/emulated.h"
 
 namespace touchstone::diagnosis {
+
+report::DataReport DataOf(const touches::Observations& observations, const DiagnosisInput& input) {
+  report::DataReport data = report::DataOfTouches(touches::SummarizeData(observations));
+  data.emulated = session::CountEmulated(*input.set);
+  return data;
+}
 
 report::Diagnosis BeginDiagnosis(const selection::Workspace& workspace) {
   report::Diagnosis diagnosis;
   diagnosis.model_name = workspace.input.model->name;
   diagnosis.model_hash = workspace.input.model->Hash();
-  diagnosis.data = touches::SummarizeData(*workspace.observations);
+  diagnosis.data = {DataOf(*workspace.observations, workspace.input)};
   diagnosis.warnings = workspace.warnings;
   return diagnosis;
 }
 
-double ReducibleShare(const engine::NoiseFloor& floor, const engine::Quality& quality) {
-  const double noise_s2 = floor.sigma * floor.sigma, error_s2 = quality.rmse * quality.rmse;
-  return error_s2 > 0 ? std::clamp(1 - noise_s2 / error_s2, 0.0, 1.0) : 0;
-}
-
 void AddHowWrong(const selection::Workspace& workspace, const std::vector<double>& residuals,
                  report::Diagnosis* diagnosis) {
-  if (diagnosis->data.touches == 0) return;
+  report::DataReport& data = diagnosis->data[0];
+  if (data.count == 0) return;
   const touches::Observations& o = *workspace.observations;
   const double rmse_s = touches::Rmse(o, residuals);
-  diagnosis->noise_floor = selection::NoiseFloorOf(o, residuals, 0);
-  diagnosis->initial = {rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)};
-  diagnosis->final = diagnosis->initial;
-  diagnosis->reducible_share = ReducibleShare(*diagnosis->noise_floor, *diagnosis->initial);
+  data.noise_floor = report::NoiseFloorOf(selection::NoiseFloorOf(o, residuals, 0));
+  data.initial = report::QualityOf({rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)});
+  data.final = data.initial;
+  data.reducible_share = report::ReducibleShare(*data.noise_floor, data.initial->rmse);
 }
 
 }  // namespace touchstone::diagnosis

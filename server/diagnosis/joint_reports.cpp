@@ -2,20 +2,16 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <cmath>
-
 #include "server/base/status.h"
 #include "server/diagnosis/checks/data_problems.h"
-#include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/early_verdicts.h"
-#include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
-#include "server/diagnosis/report/photograph_summary.h"
-#include "server/diagnosis/report/write_joint_report.h"
-#include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/diagnosis/photograph_reports.h"
+#include "server/diagnosis/report/from_photographs.h"
+#include "server/diagnosis/report/join.h"
 #include "server/diagnosis/selection/touch_modality.h"
-#include "server/effects/all_effects.h"
+#include "server/diagnosis/touch_reports.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -39,45 +35,57 @@ DiagnosisContext Stretch(const DiagnosisContext& context, double from, double to
   return part;
 }
 
+// Each kind's question.
+DiagnosisInput TouchesOf(const DiagnosisInput& input) {
+  DiagnosisInput touches = input;
+  touches.images = nullptr;
+  return touches;
+}
+
+DiagnosisInput PhotographsOf(const DiagnosisInput& input) {
+  DiagnosisInput photographs = input;
+  photographs.set = nullptr;
+  return photographs;
+}
+
 class JointDiagnoser {
  public:
   JointDiagnoser(const DiagnosisInput& input, const DiagnosisContext& context)
-      : input_(input), context_(context), touches_(input), photographs_(input) {
-    touches_.images = nullptr;
+      : input_(input), context_(context), touches_(TouchesOf(input)), photographs_(PhotographsOf(input)) {
     touches_.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
-    photographs_.set = nullptr;
   }
 
-  absl::StatusOr<v1::Report> Run() {
-    if (!input_.set->has_poses)
-      return absl::InvalidArgumentError(
-          absl::StrCat(input_.set->origin,
-                       ": touches without poses cannot be diagnosed together with photographs; take "
-                       "touches.csv out of the folder and "
-                       "diagnose it by itself"));
+  absl::StatusOr<report::Diagnosis> Run() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::DataProblem> problems,
                                 checks::FindDataProblems(touches_, Stretch(context_, 0, 0.05)));
-    d_.model_name = input_.model->name;
-    d_.model_hash = input_.model->Hash();
-    TOUCHSTONE_RETURN_IF_ERROR(Measure(*input_.model, &d_.initial));
-    if (!problems.empty()) return CheckTouches(problems);
+    parts_.model_name = input_.model->name;
+    parts_.model_hash = input_.model->Hash();
+    TOUCHSTONE_RETURN_IF_ERROR(Measure(*input_.model, &parts_.initial));
+    parts_.shared.in_place = *input_.model;
+    parts_.shared.heldout.resize(2);
+    if (!problems.empty()) {
+      // A mistake of the touches' file: the photographs beside it are compared.
+      parts_.touches = CheckDataReport(touches_, Stretch(context_, 0.5, 0.6), problems);
+      TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
+      return report::Join(std::move(parts_));
+    }
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool enough, IsEnoughForBoth());
-    d_.shared.in_place = *input_.model;
-    d_.shared.heldout.resize(2);
     if (enough) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(d_.shared, FindShared());
+      TOUCHSTONE_ASSIGN_OR_RETURN(parts_.shared, FindShared());
     }
-    if (!d_.shared.conflicts.empty()) return Contradict();
-    for (const joint::SharedStep& step : d_.shared.steps) {
-      report::JointQuality quality;
-      TOUCHSTONE_RETURN_IF_ERROR(Measure(step.model, &quality));
-      quality.touches.heldout_rmse = d_.shared.heldout[0].Of(quality.touches.heldout_rmse);
-      quality.photographs.heldout_rmse = d_.shared.heldout[1].Of(quality.photographs.heldout_rmse);
-      d_.shared_quality.push_back(quality);
+    if (!parts_.shared.conflicts.empty()) {
+      // Each kind contradicts the other: how wrong and where, and nothing else.
+      TOUCHSTONE_ASSIGN_OR_RETURN(parts_.touches, CompareTouches(touches_, Stretch(context_, 0.5, 0.6)));
+      TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
+      return report::Join(std::move(parts_));
     }
+    for (const joint::SharedStep& step : parts_.shared.steps)
+      TOUCHSTONE_RETURN_IF_ERROR(Measure(step.model, &parts_.shared_quality.emplace_back()));
     TOUCHSTONE_RETURN_IF_ERROR(DiagnoseEach());
-    Improve();
-    return report::ToJointReport(d_, *input_.images);
+    std::optional<model::Model> improved = Improved();
+    report::Diagnosis diagnosis = report::Join(std::move(parts_));
+    diagnosis.improved_model = std::move(improved);
+    return diagnosis;
   }
 
  private:
@@ -88,24 +96,28 @@ class JointDiagnoser {
     quiet.progress = [this](const std::string&, double) {
       return !context_.progress || context_.progress("comparing", 0);
     };
-    TOUCHSTONE_ASSIGN_OR_RETURN(quality->touches, selection::CompareTouches(touches_, model, quiet));
+    DiagnosisInput touches = touches_;
+    touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(model));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis compared, CompareTouches(touches, quiet));
+    if (compared.data[0].initial) quality->touches = *compared.data[0].initial;
     DiagnosisInput photographs = photographs_;
     photographs.model = std::make_shared<const model::Model>(model);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const images::PhotographDiagnosis pictures,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const images::PhotographDiagnosis found,
                                 images::ComparePhotographs(photographs, quiet));
-    if (pictures.initial) quality->photographs = *pictures.initial;
+    const report::Diagnosis pictures = report::FromPhotographs(found, *input_.images);
+    if (pictures.data[0].initial) quality->photographs = *pictures.data[0].initial;
     return absl::OkStatus();
   }
 
   absl::StatusOr<joint::SharedEffects> FindShared() const {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches,
                                 selection::TouchModality::Make(touches_, Stretch(context_, 0.05, 0.15)));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const auto photographs, images::PhotographModality::Make(
-                                                            photographs_, Stretch(context_, 0.15, 0.25)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto photographs,
+                                images::PhotographModality::Make(photographs_, Stretch(context_, 0.15, 0.25)));
     const DiagnosisContext both = Stretch(context_, 0.25, 0.5);
-    return joint::FindSharedEffects({touches.get(), photographs.get()}, *input_.model, [&](double done) {
-      return !both.progress || both.progress("fitting both together", done);
-    });
+    return joint::FindSharedEffects(
+        {touches.get(), photographs.get()}, *input_.model,
+        [&](double done) { return !both.progress || both.progress("fitting both together", done); });
   }
 
   absl::StatusOr<bool> IsEnoughForBoth() const {
@@ -116,82 +128,78 @@ class JointDiagnoser {
     return TouchesNeeded(*workspace->observations) == 0 && photographs.poses >= images::kMinPoses;
   }
 
-  absl::Status DescribePictures(const images::Expectation& expectation) {
-    residuals::DescribePhotographs(expectation, input_.seed, context_.pool, &d_.photographs);
-    for (std::string& warning : report::PhotographWarnings(d_.photographs, *input_.images))
-      d_.photographs.warnings.push_back(std::move(warning));
-    return absl::OkStatus();
-  }
-
   absl::Status ComparePictures() {
-    images::Expectation expectation;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        d_.photographs, images::ComparePhotographs(photographs_, Stretch(context_, 0.6, 0.9), &expectation));
-    return DescribePictures(expectation);
-  }
-
-  // A mistake of the touches' file: the photographs beside it are compared.
-  absl::StatusOr<v1::Report> CheckTouches(const std::vector<engine::DataProblem>& problems) {
-    d_.touches = CheckDataReport(touches_, Stretch(context_, 0.5, 0.6), problems);
-    TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
-    return report::ToJointReport(d_, *input_.images);
-  }
-
-  // Each kind contradicts the other: how wrong and where, and nothing else.
-  absl::StatusOr<v1::Report> Contradict() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(d_.touches, Compare(touches_, Stretch(context_, 0.5, 0.6)));
-    TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
-    return report::ToJointReport(d_, *input_.images);
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts_.photographs,
+                                ComparePhotographSet(photographs_, Stretch(context_, 0.6, 0.9)));
+    return absl::OkStatus();
   }
 
   absl::Status DiagnoseEach() {
     DiagnosisInput touches = touches_;
-    touches.settled = d_.shared.settled;
+    touches.settled = parts_.shared.settled;
     touches.initial_model = touches_.model;
-    touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(d_.shared.in_place));
-    TOUCHSTONE_ASSIGN_OR_RETURN(d_.touches, Diagnose(touches, Stretch(context_, 0.5, 0.7)));
+    touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(parts_.shared.in_place));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts_.touches, DiagnoseTouches(touches, Stretch(context_, 0.5, 0.7)));
     DiagnosisInput photographs = photographs_;
-    photographs.settled = d_.shared.settled;
-    photographs.model = std::make_shared<const model::Model>(d_.shared.in_place);
+    photographs.settled = parts_.shared.settled;
+    photographs.model = std::make_shared<const model::Model>(parts_.shared.in_place);
     images::Expectation expectation;
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        d_.photographs, images::DiagnosePhotographs(photographs, Stretch(context_, 0.7, 0.95), &expectation));
-    if (!d_.shared.steps.empty()) {
+        images::PhotographDiagnosis pictures,
+        images::DiagnosePhotographs(photographs, Stretch(context_, 0.7, 0.95), &expectation));
+    if (!parts_.shared.steps.empty()) {
       // Described is what the given model had left, before anything was put in place.
       if (expectation.after.empty()) expectation.after = std::move(expectation.before);
       TOUCHSTONE_ASSIGN_OR_RETURN(
           expectation.before,
           images::ExpectPhotographs(expectation.photographs, *input_.model, true, context_.pool));
     }
-    return DescribePictures(expectation);
+    parts_.photographs = DescribedPhotographs(photographs_, context_, expectation, &pictures);
+    return absl::OkStatus();
   }
 
-  // One model that holds what both kinds show.
-  void Improve() {
-    const auto improved = [this](const std::string& yaml) -> model::Model {
-      if (yaml.empty()) return d_.shared.in_place;
-      return model::ParseModel(yaml, "the improved model", effects::Catalogue()).value_or(d_.shared.in_place);
-    };
-    if (d_.shared.steps.empty() && d_.touches.improved_model_yaml.empty() &&
-        d_.photographs.improved_model_yaml.empty())
-      return;
-    model::Model both = selection::TouchPartOf(improved(d_.touches.improved_model_yaml));
-    const model::Model pictures = PhotographPartOf(improved(d_.photographs.improved_model_yaml));
-    both.effects.insert(both.effects.end(), pictures.effects.begin(), pictures.effects.end());
+  // One model that holds what both kinds show; none: nothing changed.
+  std::optional<model::Model> Improved() const {
+    const std::optional<model::Model>&touches = parts_.touches.improved_model,
+          &pictures = parts_.photographs.improved_model;
+    if (parts_.shared.steps.empty() && !touches && !pictures) return std::nullopt;
+    model::Model both = selection::TouchPartOf(touches ? *touches : parts_.shared.in_place);
+    const model::Model of_pictures = PhotographPartOf(pictures ? *pictures : parts_.shared.in_place);
+    both.effects.insert(both.effects.end(), of_pictures.effects.begin(), of_pictures.effects.end());
     both.name = input_.model->name.empty() ? "" : input_.model->name + "_better";
-    d_.improved_model_yaml = model::FormatModel(both);
-    d_.improved_model_hash = both.Hash();
+    return both;
   }
 
   const DiagnosisInput& input_;
   const DiagnosisContext& context_;
   DiagnosisInput touches_, photographs_;  // each kind's question, about the given model
-  report::JointDiagnosis d_;
+  report::JointParts parts_;
 };
 
 }  // namespace
 
-absl::StatusOr<v1::Report> DiagnoseJointSet(const DiagnosisInput& input, const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input,
+                                                  const DiagnosisContext& context) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis photographs,
+                              ComparePhotographSet(PhotographsOf(input), context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches, CompareTouches(TouchesOf(input), context));
+  return report::SideBySide(std::move(touches), std::move(photographs));
+}
+
+absl::StatusOr<report::Diagnosis> DiagnoseJointSet(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context) {
+  const DiagnosisInput photographs = PhotographsOf(input);
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders,
+                              PhotographBlunders(photographs, context));
+  if (blunders) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches, CompareTouches(TouchesOf(input), context));
+    return report::SideBySide(std::move(touches), *std::move(blunders));
+  }
+  if (!input.set->has_poses)
+    return absl::InvalidArgumentError(
+        absl::StrCat(input.set->origin,
+                     ": touches without poses cannot be diagnosed together with photographs; take "
+                     "touches.csv out of the folder and diagnose it by itself"));
   return JointDiagnoser(input, context).Run();
 }
 

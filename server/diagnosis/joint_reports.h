@@ -1,18 +1,20 @@
 // Touches and photographs of one session in one diagnosis: blunders of either kind, what both see of the objects
-// (joint/), what each kind shows beside that, one report.
-//
-// Pure functions of their input, durations aside, whatever the number of threads.
+// (joint/), what each kind shows beside that.
 #pragma once
 
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/input.h"
-#include "touchstone/v1/diagnosis.pb.h"
+#include "server/diagnosis/report/diagnosis.h"
 
 namespace touchstone::diagnosis {
 
-// `input.set`, with poses, and `input.images` are set. Errors of the improved model are those that a comparison of both with
-// it finds. Error: INVALID_ARGUMENT for touches without poses, and what either kind's diagnosis says.
-absl::StatusOr<v1::Report> DiagnoseJointSet(const DiagnosisInput& input, const DiagnosisContext& context);
+// As Compare and Diagnose (diagnose.h), of `input.set` and `input.images`. Errors of the improved model are those that a
+// comparison of both with it finds. Error of DiagnoseJointSet: INVALID_ARGUMENT for touches without poses, and what either
+// kind's diagnosis says.
+absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input,
+                                                  const DiagnosisContext& context);
+absl::StatusOr<report::Diagnosis> DiagnoseJointSet(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis

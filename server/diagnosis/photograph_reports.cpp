@@ -9,14 +9,10 @@
 #include "server/base/status.h"
 #include "server/diagnosis/checks/photo_mistakes.h"
 #include "server/diagnosis/design/propose_photographs.h"
-#include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
-#include "server/diagnosis/joint_reports.h"
-#include "server/diagnosis/report/photograph_summary.h"
-#include "server/diagnosis/report/write_photograph_report.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/from_photographs.h"
+#include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/residuals/describe_photographs.h"
-#include "server/diagnosis/selection/candidates.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -36,7 +32,7 @@ double GreyErrorOf(const DiagnosisInput& input, ThreadPool* pool) {
 
 // The problem with its errors: the model as it was given, on the set as it is and as it would be.
 engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const DiagnosisInput& input,
-                               double before_grey, ThreadPool* pool) {
+                                         double before_grey, ThreadPool* pool) {
   engine::DataProblem problem = mistake.problem;
   problem.error_before = before_grey;
   DiagnosisInput fixed = input;
@@ -54,52 +50,12 @@ engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const Diagno
   return problem;
 }
 
-void Describe(const DiagnosisInput& input, const DiagnosisContext& context,
-              const images::Expectation& expectation, images::PhotographDiagnosis* diagnosis) {
-  if (context.progress) context.progress("describing what is left", 0.95);
-  residuals::DescribePhotographs(expectation, input.seed, context.pool, diagnosis);
-  for (std::string& warning : report::PhotographWarnings(*diagnosis, *input.images))
-    diagnosis->warnings.push_back(std::move(warning));
-  diagnosis->summary = report::Summarize(*diagnosis);
-}
-
-// The comparison of touches beside the photographs; empty without them.
-absl::StatusOr<v1::Report> TouchReport(const DiagnosisInput& input, const DiagnosisContext& context) {
-  if (input.set == nullptr) return v1::Report();
-  DiagnosisInput touches = input;
-  touches.images = nullptr;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis given, diagnosis::Compare(touches, context));
-  return report::ToReport(given);
-}
-
-absl::StatusOr<v1::Report> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
-                                    const Engine& engine) {
+absl::StatusOr<report::Diagnosis> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
+                                           const Engine& engine) {
   images::Expectation expectation;
-  TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis, engine(&expectation));
-  Describe(input, context, expectation, &diagnosis);
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, TouchReport(input, context));
-  report::WritePhotographs(diagnosis, *input.images, &report);
-  return report;
-}
-
-// The report of blunders, if there are any.
-absl::StatusOr<std::optional<v1::Report>> Blunders(const DiagnosisInput& input,
-                                                   const DiagnosisContext& context) {
-  if (context.progress && !context.progress("checking the data", 0.02))
-    return absl::CancelledError("the diagnosis was cancelled");
-  const std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
-  if (mistakes.empty()) return std::optional<v1::Report>();
-  const auto engine = [&](images::Expectation* expectation) -> absl::StatusOr<images::PhotographDiagnosis> {
-    TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
-                                images::ComparePhotographs(input, context, expectation));
-    diagnosis.verdict = engine::Verdict::kCheckData;
-    for (const checks::PhotoMistake& mistake : mistakes)
-      diagnosis.data_problems.push_back(
-          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse : NAN, context.pool));
-    return diagnosis;
-  };
-  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, Reported(input, context, engine));
-  return std::optional<v1::Report>(std::move(report));
+  TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis found, engine(&expectation));
+  if (context.progress) context.progress("describing what is left", 0.95);
+  return DescribedPhotographs(input, context, expectation, &found);
 }
 
 // Diagnose, and the pictures that would tell what is left apart. `always`: Propose, which names pictures even where
@@ -134,36 +90,61 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
   return diagnosis;
 }
 
-absl::StatusOr<v1::Report> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
-                                         const Engine& engine) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
+absl::StatusOr<report::Diagnosis> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
+                                                const Engine& engine) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders, PhotographBlunders(input, context));
   if (blunders) return *std::move(blunders);
   return Reported(input, context, engine);
 }
 
 }  // namespace
 
-absl::StatusOr<v1::Report> ComparePhotographSet(const DiagnosisInput& input,
-                                                const DiagnosisContext& context) {
+report::Diagnosis DescribedPhotographs(const DiagnosisInput& input, const DiagnosisContext& context,
+                                       const images::Expectation& expectation,
+                                       images::PhotographDiagnosis* found) {
+  residuals::DescribePhotographs(expectation, input.seed, context.pool, found);
+  report::Diagnosis diagnosis = report::FromPhotographs(*found, *input.images);
+  for (std::string& warning : report::DataWarnings(diagnosis.data[0]))
+    diagnosis.warnings.push_back(std::move(warning));
+  diagnosis.summary = report::Summarize(diagnosis);
+  return diagnosis;
+}
+
+absl::StatusOr<std::optional<report::Diagnosis>> PhotographBlunders(const DiagnosisInput& input,
+                                                                    const DiagnosisContext& context) {
+  if (context.progress && !context.progress("checking the data", 0.02))
+    return absl::CancelledError("the diagnosis was cancelled");
+  const std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
+  if (mistakes.empty()) return std::optional<report::Diagnosis>();
+  const auto engine = [&](images::Expectation* expectation) -> absl::StatusOr<images::PhotographDiagnosis> {
+    TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
+                                images::ComparePhotographs(input, context, expectation));
+    diagnosis.verdict = engine::Verdict::kCheckData;
+    for (const checks::PhotoMistake& mistake : mistakes)
+      diagnosis.data_problems.push_back(
+          WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse : NAN, context.pool));
+    return diagnosis;
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis diagnosis, Reported(input, context, engine));
+  return std::optional<report::Diagnosis>(std::move(diagnosis));
+}
+
+absl::StatusOr<report::Diagnosis> ComparePhotographSet(const DiagnosisInput& input,
+                                                       const DiagnosisContext& context) {
   return Reported(input, context, [&](images::Expectation* expectation) {
     return images::ComparePhotographs(input, context, expectation);
   });
 }
 
-absl::StatusOr<v1::Report> DiagnosePhotographSet(const DiagnosisInput& input,
-                                                 const DiagnosisContext& context) {
-  if (input.set != nullptr) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<v1::Report> blunders, Blunders(input, context));
-    if (blunders) return *std::move(blunders);
-    return DiagnoseJointSet(input, context);
-  }
+absl::StatusOr<report::Diagnosis> DiagnosePhotographSet(const DiagnosisInput& input,
+                                                        const DiagnosisContext& context) {
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, kDefaultPhotographs, false, context, expectation);
   });
 }
 
-absl::StatusOr<v1::Report> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
-                                                const DiagnosisContext& context) {
+absl::StatusOr<report::Diagnosis> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
+                                                       const DiagnosisContext& context) {
   return BlundersFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, max_photographs, true, context, expectation);
   });

@@ -27,7 +27,11 @@ report::Diagnosis DiagnoseWithMap(DiagnosisInput input) {
   return diagnosis.ok() ? *diagnosis : report::Diagnosis();
 }
 
-// What a comparison of the rig's touches with this model finds, s.
+std::string YamlOf(const report::Diagnosis& diagnosis) {
+  return diagnosis.improved_model ? model::FormatModel(*diagnosis.improved_model) : "";
+}
+
+// What a comparison of the rig's touches with this model finds, us.
 double ComparedRmse(const touches::HiddenRig& rig, const std::string& model_yaml) {
   DiagnosisInput input = touches::MakeTestInput(rig);
   const auto model = model::ParseModel(model_yaml, "improved.yaml", effects::Catalogue());
@@ -36,7 +40,7 @@ double ComparedRmse(const touches::HiddenRig& rig, const std::string& model_yaml
   input.model = std::make_shared<const model::Model>(*model);
   const absl::StatusOr<report::Diagnosis> report = Compare(input, {});
   EXPECT_TRUE(report.ok()) << report.status();
-  return report.ok() ? report->initial->rmse : NAN;
+  return report.ok() ? report->data[0].initial->rmse : NAN;
 }
 
 TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
@@ -46,16 +50,17 @@ TEST(SurfaceMapOfADiagnosis, LeavesOnUnseenTouchesWhatTheReportSays) {
   EXPECT_EQ(report.steps[0].effect, "surface_map");
   EXPECT_EQ(report.verdict, engine::Verdict::kMissingEffects) << report.summary;
   // On the same touches: what the report gives as the error.
-  EXPECT_NEAR(ComparedRmse(rig, report.improved_model_yaml), report.final->rmse, 0.01 * report.final->rmse);
+  EXPECT_NEAR(ComparedRmse(rig, YamlOf(report)), report.data[0].final->rmse,
+              0.01 * report.data[0].final->rmse);
   // On other touches of the same objects: what it gives as the error on unseen ones, and not what the same touches have.
   touches::HiddenRig others = rig;
   others.pose_seed = 77;
-  const double unseen_s = ComparedRmse(others, report.improved_model_yaml);
+  const double unseen_us = ComparedRmse(others, YamlOf(report));
   // Steep touches, of which each set has others, weigh most.
-  EXPECT_LT(unseen_s, 1.5 * report.final->heldout_rmse);
-  EXPECT_GT(unseen_s, report.final->heldout_rmse / 1.5);
-  EXPECT_GT(unseen_s, 1.2 * report.final->rmse);
-  EXPECT_LT(unseen_s, 0.6 * ComparedRmse(others, model::FormatModel(*touches::MakeTestInput(rig).model)));
+  EXPECT_LT(unseen_us, 1.5 * report.data[0].final->heldout_rmse);
+  EXPECT_GT(unseen_us, report.data[0].final->heldout_rmse / 1.5);
+  EXPECT_GT(unseen_us, 1.2 * report.data[0].final->rmse);
+  EXPECT_LT(unseen_us, 0.6 * ComparedRmse(others, model::FormatModel(*touches::MakeTestInput(rig).model)));
 }
 
 TEST(SurfaceMapOfADiagnosis, IsClaimedOnlyWhereItIsAskedFor) {
@@ -63,16 +68,16 @@ TEST(SurfaceMapOfADiagnosis, IsClaimedOnlyWhereItIsAskedFor) {
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->steps.size(), 1u) << report->summary;
   EXPECT_EQ(report->steps[0].effect, "surface_error");
-  EXPECT_EQ(report->final->rmse, report->initial->rmse);
+  EXPECT_EQ(report->data[0].final->rmse, report->data[0].initial->rmse);
 }
 
 TEST(SurfaceMapOfADiagnosis, KnowsTheSurfaceWithinItsStandardDeviation) {
   const DiagnosisInput input = touches::MakeTestInput(BumpyRig());
   const report::Diagnosis report = DiagnoseWithMap(input);
-  const auto model = model::ParseModel(report.improved_model_yaml, "improved.yaml", effects::Catalogue());
+  const auto model = model::ParseModel(YamlOf(report), "improved.yaml", effects::Catalogue());
   ASSERT_TRUE(model.ok()) << model.status();
   const auto& spec = model->effects.back().effect->surface_map;
-  ASSERT_NE(spec, nullptr) << report.improved_model_yaml;
+  ASSERT_NE(spec, nullptr) << YamlOf(report);
   // The truth at the map's points, from the effect that hid it.
   const auto hidden = effects::Catalogue().Find("surface_error");
   double squares = 0, count = 0;
@@ -105,7 +110,7 @@ TEST(SurfaceMapOfADiagnosis, LeavesNothingToFindOnItsOwnTouches) {
   DiagnosisInput input = touches::MakeTestInput(BumpyRig());
   const report::Diagnosis report = DiagnoseWithMap(input);
   input.model = std::make_shared<const model::Model>(
-      *model::ParseModel(report.improved_model_yaml, "improved.yaml", effects::Catalogue()));
+      *model::ParseModel(YamlOf(report), "improved.yaml", effects::Catalogue()));
   const report::Diagnosis again = DiagnoseWithMap(input);
   EXPECT_EQ(again.verdict, engine::Verdict::kAdequate) << again.summary;
 }

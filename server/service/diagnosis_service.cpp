@@ -13,12 +13,10 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/photograph_reports.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
-#include "server/session/emulated.h"
 
 namespace touchstone::service {
 namespace {
@@ -114,10 +112,6 @@ void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput
   } else if (input.images != nullptr && input.set == nullptr) {
     provenance->set_set_sha256(input.images->sha256);
   }
-  // Wherever a set was copied to, its report says that no camera saw it.
-  if (input.images != nullptr)
-    if (const std::string emulated = session::EmulatedPhotographs(*input.images); !emulated.empty())
-      report->add_warnings(emulated);
   std::vector<std::string> objects;
   if (input.set != nullptr) objects = input.set->objects;
   if (input.images != nullptr)
@@ -206,13 +200,12 @@ grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::C
   v1::Report report;
   const Work work = [](const diagnosis::DiagnosisInput& input,
                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
-    if (input.images != nullptr) return touchstone::diagnosis::ComparePhotographSet(input, how);
     return AsReport(touchstone::diagnosis::Compare(input, how));
   };
   const absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
-  // Photographs have theirs in grey levels.
-  if (status.ok() && report.initial().rmse_us() > 0)
-    resources_->last_comparison_rmse_us = report.initial().rmse_us();
+  for (const v1::DataReport& data : report.data())
+    if (status.ok() && data.kind() == v1::DataReport::TOUCHES && data.initial().rmse() > 0)
+      resources_->last_comparison_rmse_us = data.initial().rmse();
   return ToGrpc(status);
 }
 
@@ -233,7 +226,6 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     diagnosis::DiagnosisInput asked = input;
     asked.with_surface_map = with_surface_map;
-    if (input.images != nullptr) return touchstone::diagnosis::DiagnosePhotographSet(asked, how);
     return AsReport(touchstone::diagnosis::Diagnose(asked, how));
   };
   absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
@@ -267,9 +259,8 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
       alone.images = nullptr;
     else
       alone.set = nullptr;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        v1::Report report, of_touches ? AsReport(touchstone::diagnosis::Propose(alone, touches, how))
-                                      : touchstone::diagnosis::ProposePhotographSet(alone, photographs, how));
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, AsReport(touchstone::diagnosis::Propose(
+                                                       alone, of_touches ? touches : photographs, how)));
     if (both)
       report.add_warnings(of_touches
                               ? "proposed from the touches alone: the photographs of the set took no part"

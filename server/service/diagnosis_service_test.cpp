@@ -101,11 +101,11 @@ TEST_F(DiagnosisServiceTest, EvidenceIsCheckedBeforeAnyWork) {
   evidence.set_origin("set.csv");
   v1::MeshFile* mesh = evidence.add_meshes();
   mesh->set_name("cup");
-  mesh->set_format("off");
+  mesh->set_format(v1::MeshFile::OFF);
   mesh->set_data("OFF\n3 1 0\n0 0 0\n1 0\n");
   EXPECT_THAT(message(evidence), HasSubstr("mesh 'cup': "));
-  mesh->set_format("png");
-  EXPECT_THAT(message(evidence), HasSubstr("png"));
+  mesh->clear_format();
+  EXPECT_THAT(message(evidence), HasSubstr("mesh 'cup': format is not set; one of off, obj, stl, ply"));
   *evidence.add_meshes() = *mesh;
   EXPECT_THAT(message(evidence), HasSubstr("two are named 'cup'"));
   evidence.clear_meshes();
@@ -127,7 +127,7 @@ TEST_F(DiagnosisServiceTest, AnObjectOfTheRequestComesBeforeTheServersOwn) {
   evidence.set_csv(Csv(3));
   v1::MeshFile* mesh = evidence.add_meshes();
   mesh->set_name("lat00");
-  mesh->set_format("off");
+  mesh->set_format(v1::MeshFile::OFF);
   mesh->set_data("not even a header");
   EXPECT_THAT(Compare(evidence).error_message(), HasSubstr("mesh 'lat00'"));
 }

@@ -111,18 +111,29 @@ std::vector<std::pair<std::string, std::string>> ObjectsOf(const diagnosis::Diag
   return objects;
 }
 
+// "MM" as geometry has it: "mm". A number that has no name becomes what no mesh has.
+std::string NameInFiles(const std::string& name, int number) {
+  return name.empty() ? absl::StrCat(number) : absl::AsciiStrToLower(name);
+}
+
 absl::StatusOr<std::shared_ptr<const geometry::Surface>> ReadSurface(const v1::MeshFile& file) {
   const std::string place = absl::StrCat("mesh '", file.name(), "'");
   geometry::MeshImport import;
-  if (!file.unit().empty()) import.unit = file.unit();
-  if (!file.up().empty()) import.up = file.up();
+  if (file.unit() != v1::MeshFile::LENGTH_UNIT_UNSPECIFIED)
+    import.unit = NameInFiles(v1::MeshFile::LengthUnit_Name(file.unit()), file.unit());
+  if (file.up() != v1::MeshFile::AXIS_UNSPECIFIED)
+    import.up = NameInFiles(v1::MeshFile::Axis_Name(file.up()), file.up());
   if (file.scale() != 0) import.scale = file.scale();
   if (file.fit_mm() != 0) import.fit_mm = file.fit_mm();
   const auto in_place = [&](const absl::Status& status) {
     return absl::Status(status.code(), absl::StrCat(place, ": ", status.message()));
   };
-  auto mesh = geometry::ReadMeshBytes(absl::StrCat(file.name(), ".", file.format()),
-                                      absl::AsciiStrToLower(file.format()), file.data(), import);
+  if (file.format() == v1::MeshFile::FORMAT_UNSPECIFIED)
+    return absl::InvalidArgumentError(absl::StrCat(place, ": format is not set; one of ",
+                                                   absl::StrJoin(geometry::MeshFormatNames(), ", "),
+                                                   " was expected"));
+  const std::string format = NameInFiles(v1::MeshFile::Format_Name(file.format()), file.format());
+  auto mesh = geometry::ReadMeshBytes(absl::StrCat(file.name(), ".", format), format, file.data(), import);
   if (!mesh.ok()) return in_place(mesh.status());
   auto surface = geometry::Surface::Create(file.name(), *std::move(mesh));
   if (!surface.ok()) return in_place(surface.status());

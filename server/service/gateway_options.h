@@ -29,6 +29,7 @@ struct GatewayOptions {
   std::string audit_log = "rig.audit.jsonl";
   std::string calibration = "calibration.yaml";
   std::string provenance_note;
+  bool emulated = false;
   double time_scale = 1;
   std::string emulated_clock;  // a file (timing/paced_clock.h); empty: this host's clock
   std::vector<std::string> mount_command;

@@ -88,6 +88,7 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
   rig.mount_command = options.mount_command;
   rig.mount_timeout_s = options.mount_timeout_s;
   rig.provenance_note = options.provenance_note;
+  rig.emulated = options.emulated;
   rig.effector_port = options.effector.port;
   rig.bounds_of = [&objects](const std::string& name) -> std::optional<geometry::Bounds> {
     const absl::StatusOr<const source::ServedObject*> object = objects.Find(name, "object");

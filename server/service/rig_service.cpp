@@ -203,6 +203,7 @@ void RigService::Describe(v1::RigState* state) const {
   state->set_fingers(rig_->fingers());
   state->set_spacing_m(rig_->spacing_m());
   state->set_provenance(rig_->Provenance());
+  state->set_emulated(rig_->options().emulated);
   state->set_calibration(gateway::calibration::FormatCalibration(rig_->planner().calibration()));
   state->set_safety_notice(
       "Stop is a software stop: it is not safety-rated. Keep the emergency stop within reach.");

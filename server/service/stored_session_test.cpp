@@ -148,7 +148,7 @@ class EvidenceOfImages : public ::testing::Test {
     for (const char* name : {"cup", "mug"}) {
       v1::MeshFile* mesh = evidence_.add_meshes();
       mesh->set_name(name);
-      mesh->set_format("off");
+      mesh->set_format(v1::MeshFile::OFF);
       mesh->set_data("OFF\n4 4 0\n0 0 0\n50 0 0\n0 50 0\n0 0 50\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
     }
   }

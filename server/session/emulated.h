@@ -6,16 +6,19 @@
 #include <absl/strings/string_view.h>
 
 #include "server/session/image_set.h"
+#include "server/session/measurement_set.h"
 
 namespace touchstone::session {
 
-// Column of images.csv: 1 where an emulator took the photograph. It goes along into every file and store.
+// Column of images.csv and of measurement files: 1 where an emulator made the row. It goes along into every file and store.
 inline constexpr char kEmulatedCovariate[] = "cov_emulated";
 
-// Whether what a session or a rig says of where its data are from (JournalSession::provenance) names an emulator.
-bool NamesAnEmulator(absl::string_view provenance);
+// Of sessions that were written before JournalSession::emulated was kept, all that is known: emulators wrote it into the
+// note of where the data are from.
+bool NotedAsEmulated(absl::string_view provenance);
 
-// The photographs of a set that an emulator took, in words for a report; empty: there is none.
-std::string EmulatedPhotographs(const ImageSet& set);
+// How many rows of a set an emulator made.
+int CountEmulated(const ImageSet& set);
+int CountEmulated(const MeasurementSet& set);
 
 }  // namespace touchstone::session

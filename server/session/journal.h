@@ -102,8 +102,8 @@ struct JournalSession {
   int64_t id = 0;
   std::string name;
   double created_unix_s = 0;
-  // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"; an emulator says that it is one.
-  std::string provenance;
+  std::string provenance;   // "UR3e at 192.168.0.10, nano33ble 0.1.0 at /dev/ttyACM0"
+  bool emulated = false;    // an emulator was in the rig's place: what it made measures nothing
   std::string calibration;  // the calibration file, whole
   int fingers = 3;
   double spacing_m = 0.03;

@@ -4,6 +4,7 @@
 
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
+#include "server/session/emulated.h"
 #include "server/session/journal_views.h"
 
 namespace touchstone::session {
@@ -50,6 +51,24 @@ absl::Status Gone(const SqliteFile& file, absl::string_view what) {
 
 }  // namespace
 
+namespace {
+
+// The fact that says whether an emulator made a session; sessions of before it was kept have none.
+std::string EmulatedFact(int64_t session_id) {
+  return absl::StrCat("session_", session_id, "_emulated");
+}
+
+// A journal whose facts are damaged still gives its sessions: Journal::Fact reports the damage.
+absl::StatusOr<bool> ReadEmulated(SqliteFile* file, const JournalSession& session) {
+  const std::string key = EmulatedFact(session.id);
+  SqliteStatement row = file->Prepare("SELECT value FROM fact WHERE key = ?");
+  row.Bind(key);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
+  return found ? row.Text(0) != "0" : NotedAsEmulated(session.provenance);
+}
+
+}  // namespace
+
 absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& session) {
   SqliteStatement insert = file->Prepare(
       "INSERT INTO session(name, created_unix_s, source, calibration, fingers, spacing_m, checksum) "
@@ -61,6 +80,7 @@ absl::StatusOr<int64_t> InsertSession(SqliteFile* file, const JournalSession& se
   TOUCHSTONE_RETURN_IF_ERROR(WriteTally(file, session_id, SessionTally()));
   TOUCHSTONE_RETURN_IF_ERROR(AddToSessionCount(file, 1));
   TOUCHSTONE_RETURN_IF_ERROR(SealSession(file, session_id));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteFact(file, EmulatedFact(session_id), session.emulated ? "1" : "0"));
   return session_id;
 }
 
@@ -288,6 +308,7 @@ absl::StatusOr<JournalSession> ReadSession(SqliteFile* file, int64_t session_id,
     if (!row.IsNull(6)) session.deleted_unix_s = row.Double(6);
     session.deleted_by = row.Text(7);
   }
+  TOUCHSTONE_ASSIGN_OR_RETURN(session.emulated, ReadEmulated(file, session));
   SessionTally tally;
   if (with_counts) {
     TOUCHSTONE_ASSIGN_OR_RETURN(tally, ReadTally(file, session_id));

@@ -152,7 +152,7 @@ absl::Status CheckSessionContent(const SessionContent& content, const std::strin
     TOUCHSTONE_RETURN_IF_ERROR(CheckImage(content.images[k], Entry(origin, "picture", k)));
   if (content.touches.empty()) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<MeasuredTouch> measured,
-                              MeasuredTouchesOf(content.touches, origin));
+                              MeasuredTouchesOf(content.touches, content.session.emulated, origin));
   return MakeMeasurementSet(measured, origin).status();
 }
 

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -11,6 +12,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
+#include "server/session/emulated.h"
 #include "server/session/session_content_checks.h"
 #include "server/session/session_measurements.h"
 
@@ -55,6 +57,11 @@ absl::StatusOr<SessionContent> ReadSessionCsv(const std::string& path, const Imp
   session.name = options.session;
   session.created_unix_s = options.created_unix_s;
   session.provenance = options.provenance.empty() ? absl::StrCat("imported from ", path) : options.provenance;
+  session.emulated = std::any_of(measured.begin(), measured.end(), [](const MeasuredTouch& touch) {
+    const auto& covariates = touch.commanded.covariates();
+    const auto found = covariates.find(kEmulatedCovariate);
+    return found != covariates.end() && std::abs(found->second) > 0;
+  });
   session.fingers = static_cast<int>(measured[0].time_s.size());
   session.spacing_m = options.spacing_m;
   TOUCHSTONE_RETURN_IF_ERROR(CheckSessionContent(content, path));

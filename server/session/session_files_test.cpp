@@ -16,6 +16,7 @@
 #include "server/base/text.h"
 #include "server/image/encode.h"
 #include "server/session/command_bytes.h"
+#include "server/session/emulated.h"
 #include "server/session/session_measurements.h"
 
 namespace touchstone::session {
@@ -102,6 +103,40 @@ TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {
   // The ids are no numbers: the session's are taken.
   EXPECT_EQ((*touches)[0].touch, 1u);
   EXPECT_EQ((*touches)[1].touch, 2u);
+}
+
+TEST_F(SessionFiles, AnEmulatorsMarkGoesAlongIntoEveryFileAndBack) {
+  Import(kCsv);
+  EXPECT_FALSE(journal_->Session("s")->emulated);
+  SessionContent content = *ReadSessionCsv(csv_, options_);
+  content.session.name = "emulated";
+  content.session.emulated = true;
+  ASSERT_TRUE(journal_->AddSession(content).ok());
+  EXPECT_TRUE(journal_->Session("emulated")->emulated);
+  const auto set = SessionMeasurementSet(*journal_, "emulated", "emulated");
+  ASSERT_TRUE(set.ok()) << set.status();
+  EXPECT_EQ(CountEmulated(*set), 3);
+  EXPECT_EQ(CountEmulated(*SessionMeasurementSet(*journal_, "s", "s")), 0);
+  const std::string csv = folder_ + "/emulated.csv", h5 = folder_ + "/emulated.h5";
+  ASSERT_TRUE(ExportSessionCsv(*journal_, "emulated", csv).ok());
+  EXPECT_TRUE(ReadSessionCsv(csv, options_)->session.emulated);
+  ASSERT_TRUE(ExportSessionHdf5(*journal_, "emulated", h5).ok());
+  EXPECT_TRUE(ReadSessionHdf5(h5, options_)->session.emulated);
+}
+
+TEST_F(SessionFiles, OfAPlanFromAnEmulatedSessionTheSessionSaysWhetherItIs) {
+  std::string text = kCsv;
+  text.insert(text.find('\n'), ",cov_emulated");
+  for (size_t at = text.find('\n', text.find('\n') + 1); at != std::string::npos;
+       at = text.find('\n', at + 3))
+    text.insert(at, ",1");
+  ASSERT_TRUE(WriteFileAtomically(csv_, text).ok());
+  auto content = ReadSessionCsv(csv_, options_);
+  ASSERT_TRUE(content.ok()) << content.status();
+  EXPECT_TRUE(content->session.emulated);
+  content->session.emulated = false;  // made again, on a real rig
+  ASSERT_TRUE(journal_->AddSession(*content).ok());
+  EXPECT_EQ(CountEmulated(*SessionMeasurementSet(*journal_, "s", "s")), 0);
 }
 
 // Every column, NaN where NaN is; numbers within the relative `tolerance`.

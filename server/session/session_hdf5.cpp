@@ -8,6 +8,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/session/command_bytes.h"
+#include "server/session/emulated.h"
 #include "server/session/hdf5_file.h"
 #include "server/session/session_content_checks.h"
 #include "server/session/session_files.h"
@@ -276,6 +277,7 @@ absl::Status ExportSessionHdf5(const Journal& journal, const std::string& name, 
   columns.Texts("session/format", {kFormat});
   columns.Texts("session/name", {session.name});
   columns.Texts("session/source", {session.provenance});
+  columns.Whole("session/emulated", {session.emulated ? 1u : 0u}, {1});
   columns.Texts("session/calibration", {session.calibration});
   columns.Numbers("session/created_unix_s", "s", {session.created_unix_s}, {1});
   columns.Numbers("session/spacing_m", "m", {session.spacing_m}, {1});
@@ -302,6 +304,12 @@ absl::StatusOr<SessionContent> ReadSessionHdf5(const std::string& path, const Im
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto counts, file.Whole("session/fingers_touches_images", 3));
   session.name = options.session.empty() ? name[0] : options.session;
   session.provenance = options.provenance.empty() ? source[0] : options.provenance;
+  // Files of before it was kept have the note alone.
+  session.emulated = NotedAsEmulated(source[0]);
+  if (file.Has("session/emulated")) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto emulated, file.Whole("session/emulated", 1));
+    session.emulated = emulated[0] != 0;
+  }
   session.calibration = calibration[0];
   session.created_unix_s = created_unix_s[0];
   session.spacing_m = spacing_m[0];

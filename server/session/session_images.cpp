@@ -59,7 +59,7 @@ CameraIntrinsics LensOf(const JournalImage& image) {
 class SessionImageSet {
  public:
   explicit SessionImageSet(const JournalSession& session)
-      : emulated_(NamesAnEmulator(session.provenance)), session_(session.name) {
+      : emulated_(session.emulated), session_(session.name) {
     set_.origin = session.name;
     set_.has_session_time = set_.has_round = true;
   }

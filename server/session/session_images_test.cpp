@@ -144,18 +144,18 @@ TEST_F(SessionImages, BecomeAnImageSetInTheObjectsFrame) {
   EXPECT_EQ(set->camera.k1, -0.2);
   EXPECT_EQ(set->camera.k2, 1.0 / 3);
   EXPECT_EQ(set->camera.p1, 0.001);
-  EXPECT_EQ(EmulatedPhotographs(*set), "");
+  EXPECT_EQ(CountEmulated(*set), 0);
 }
 
 TEST_F(SessionImages, OfAnEmulatedRigSaySo) {
   JournalSession session;
   session.name = "emulated";
-  session.provenance = "emulated rig: not a measurement of anything; UR3e at 127.0.0.1";
+  session.emulated = true;
   ASSERT_TRUE(journal_->EnsureSession(session).ok());
   ASSERT_TRUE(journal_->AddImage("emulated", ImageWithView("a", 0)).ok());
   const auto files = SessionImageSetFiles(*journal_, "emulated");
   ASSERT_TRUE(files.ok()) << files.status();
-  EXPECT_THAT(EmulatedPhotographs(*ParseImageSet(*files)), HasSubstr("photographs are emulated"));
+  EXPECT_EQ(static_cast<size_t>(CountEmulated(*ParseImageSet(*files))), ParseImageSet(*files)->size());
 }
 
 TEST_F(SessionImages, WhatIsNoImageSetIsRefusedWithItsPicture) {

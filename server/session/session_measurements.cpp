@@ -10,6 +10,7 @@
 #include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/session/command_bytes.h"
+#include "server/session/emulated.h"
 
 namespace touchstone::session {
 namespace {
@@ -21,7 +22,7 @@ Eigen::Vector3d VectorOf(const v1::Vector3& v) {
 }  // namespace
 
 absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done,
-                                                             const std::string& where) {
+                                                             bool emulated, const std::string& where) {
   std::vector<MeasuredTouch> touches;
   std::vector<uint64_t> ids;
   for (const JournalTouch& touch : done) {
@@ -33,6 +34,9 @@ absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<J
     measured.touch = touch.number;
     measured.object = touch.object;
     measured.commanded = *command;
+    // What was touched is what the session says, whatever the plan was made from.
+    measured.commanded.mutable_covariates()->erase(kEmulatedCovariate);
+    if (emulated) (*measured.commanded.mutable_covariates())[kEmulatedCovariate] = 1;
     if (!std::isnan(touch.result.session_time_s))
       measured.commanded.set_session_time_s(touch.result.session_time_s);
     for (const JournalFinger& finger : touch.result.fingers) measured.time_s.push_back(finger.contact_time_s);
@@ -50,12 +54,13 @@ absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<J
 
 absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
                                                                const std::string& session) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const JournalSession head, journal.Session(session));
   std::vector<JournalTouch> done;
   TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session, [&](const JournalTouch& touch) {
     if (touch.stage == TouchStage::kDone) done.push_back(touch);
     return true;
   }));
-  return MeasuredTouchesOf(done, absl::StrCat("session '", session, "'"));
+  return MeasuredTouchesOf(done, head.emulated, absl::StrCat("session '", session, "'"));
 }
 
 absl::StatusOr<MeasurementSet> MakeMeasurementSet(const std::vector<MeasuredTouch>& touches,

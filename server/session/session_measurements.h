@@ -18,9 +18,10 @@ namespace touchstone::session {
 absl::StatusOr<std::vector<MeasuredTouch>> SessionMeasurements(const Journal& journal,
                                                                const std::string& session);
 
-// The same of touches that are all done; `where` begins an error.
+// The same of touches that are all done; `emulated`: of their session, becomes the column of emulated.h; `where` begins an
+// error.
 absl::StatusOr<std::vector<MeasuredTouch>> MeasuredTouchesOf(const std::vector<JournalTouch>& done,
-                                                             const std::string& where);
+                                                             bool emulated, const std::string& where);
 
 // The set that ParseMeasurementSet reads from FormatMeasurements(touches), bit for bit, and refused where it would
 // be. At least one touch, all with the same number of times, at least one. `origin` is what messages call it.

@@ -52,9 +52,10 @@ def test_rig_photos_can_be_compared_as_they_stand_and_say_that_they_are_emulated
     result = report("compare", photos, model, tmp_path)
     with open(photos / "images.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert result["images"] == len(rows) >= 6
+    data, = result["data"]
+    assert data["count"] == len(rows) >= 6 and data["emulated"]
     assert all(row["cov_emulated"] == "1" and row["round"] == "0" and row["measured_eye_x_mm"] for row in rows)
-    assert 1 < result["initial"]["rmse_grey"] < 100
+    assert 1 < data["initial"]["rmse"] < 100
     assert any("emulated" in warning for warning in result["warnings"])
 
 
@@ -67,10 +68,11 @@ def test_a_diagnosis_of_what_the_gateway_kept_names_the_hidden_lens(rig, photos,
     found = {each["name"]: each["value"] for each in steps["radial_distortion"]["parameters"]}
     # k1 and k2 stand in for each other on so small an object: what counts is the shift that they make at its rim.
     assert abs(found["k1"] + found["k2"] * RIM ** 2 - HIDDEN_K1) < 0.05
-    assert result["final"]["rmse_grey"] < 0.3 * result["initial"]["rmse_grey"]
+    data, = result["data"]
+    assert data["final"]["rmse"] < 0.3 * data["initial"]["rmse"] and data["emulated"]
     # The same pictures at the same size are as wrong either way.
-    straight = report("compare", photos, model, tmp_path)
-    assert abs(straight["initial"]["rmse_grey"] - result["initial"]["rmse_grey"]) < 0.05
+    straight, = report("compare", photos, model, tmp_path)["data"]
+    assert abs(straight["initial"]["rmse"] - data["initial"]["rmse"]) < 0.05
     assert any("emulated" in warning for warning in result["warnings"])
 
 
@@ -81,5 +83,5 @@ def test_an_image_set_becomes_hdf5_and_a_folder_again_byte_for_byte(photos, mode
     assert names == sorted(path.name for path in (tmp_path / "again").iterdir())
     for name in names:
         assert (photos / name).read_bytes() == (tmp_path / "again" / name).read_bytes(), name
-    assert report("compare", tmp_path / "set.h5", model, tmp_path)["initial"] == \
-        report("compare", photos, model, tmp_path)["initial"]
+    assert report("compare", tmp_path / "set.h5", model, tmp_path)["data"][0]["initial"] == \
+        report("compare", photos, model, tmp_path)["data"][0]["initial"]

@@ -133,7 +133,7 @@ TEST_F(GatewayPhotographs, ThatWereAcknowledgedOutliveAKilledGatewayAndAreAnImag
     const v1::Vector3& told = taken[k].photographs(0).measured().eye_m();
     EXPECT_LT((row.measured->eye_m - Eigen::Vector3d(told.x(), told.y(), told.z())).norm(), 1e-9);
   }
-  EXPECT_THAT(session::EmulatedPhotographs(*set), HasSubstr("are emulated"));
+  EXPECT_EQ(static_cast<size_t>(session::CountEmulated(*set)), set->size());
   // Imported at a server the session has the hash that the gateway tells.
   const v1::Session described = Describe();
   EXPECT_EQ(described.images(), 3u);

@@ -79,7 +79,7 @@ void WriteGatewayConfig(const EmulatorOptions& options, const EmulatorAddresses&
   text += "journal = " + Quoted(dir + "/rig.db") + "\n";
   text += "audit_log = " + Quoted(dir + "/audit.jsonl") + "\n";
   text += "calibration = " + Quoted(dir + "/calibration.yaml") + "\n";
-  text += "provenance_note = \"emulated rig: not a measurement of anything\"\n";
+  text += "provenance_note = \"emulated rig: not a measurement of anything\"\nemulated = true\n";
   text += absl::StrFormat("time_scale = %.9g\n", options.speedup);
   text += "emulated_clock = " + Quoted(ClockFile(options)) + "\n";
   if (!addresses.program.empty())

@@ -56,8 +56,8 @@ TEST_F(EmulatorTest, WritesWhatAGatewayNeedsAndSaysThatItIsEmulated) {
     EXPECT_NE(Text(path).find("emulated rig"), std::string::npos) << path;
   const std::string config = Text(emulator_->config_path());
   for (const char* key :
-       {"journal = ", "audit_log = ", "calibration = ", "provenance_note = ", "time_scale = 20\n",
-        "emulated_clock = ", "mount_command = [\"/usr/bin/true\", \"tell\", ",
+       {"journal = ", "audit_log = ", "calibration = ", "provenance_note = ", "emulated = true\n",
+        "time_scale = 20\n", "emulated_clock = ", "mount_command = [\"/usr/bin/true\", \"tell\", ",
         "mesh = [\"box=", "[arm]\nmodel = \"ur3e\"",
         "rtde_port = ", "[effector]\nport = ", "sensor = \"optical\"", "[camera]\nuri = \"http://"})
     EXPECT_NE(config.find(key), std::string::npos) << key << "\n" << config;

@@ -48,6 +48,9 @@ def test_the_hidden_effect_is_found_and_the_error_falls(report):
     assert report.final_rmse_us == pytest.approx(report.noise_floor_us, rel=0.15)
     assert report.rmse_us > 3 * report.final_rmse_us
     assert np.isnan(report.rmse_grey) and np.isnan(report.final_rmse_grey)
+    data, = report.data
+    assert (data.kind, data.unit, data.emulated) == ("touches", "us", False)
+    assert data.after_step[-1].rmse == pytest.approx(data.final.rmse) and report.of("photographs") is None
 
 
 def test_the_fall_is_found_again_by_compare(server, measured, report, tmp_path):
@@ -79,9 +82,14 @@ def test_it_says_what_the_command_line_says(server, server_program, measured, re
     theirs, ours = json.loads((tmp_path / "report.json").read_text()), report.to_dict()
     for name in ("verdict", "summary", "warnings", "improved_model_yaml", "improved_model_hash"):
         assert ours[name] == theirs[name]
-    for name in ("steps", "candidates", "where", "initial", "final", "ambiguities"):
+    for name in ("steps", "ambiguities", "next"):
         assert rounded(ours[name]) == rounded(theirs[name])
-    assert set(theirs) - set(ours) <= {"unexplained"}  # written by this one where it is there
+    assert set(theirs) == set(ours) and len(ours["data"]) == 1
+    for name in ("kind", "unit", "session", "emulated", "count", "set_aside", "noise_floor", "initial", "after_step", "final",
+                 "where", "candidates", "set"):
+        assert rounded(ours["data"][0][name]) == rounded(theirs["data"][0][name])
+    # Written by this one where it is there.
+    assert set(theirs["data"][0]) - set(ours["data"][0]) <= {"unexplained"}
     report.save(tmp_path / "ours.json")
     assert json.loads((tmp_path / "ours.json").read_text())["verdict"] == "MISSING_EFFECTS"
 

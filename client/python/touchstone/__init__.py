@@ -35,16 +35,16 @@ from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
-from .report import Report, Step, Value
+from .report import DataReport, Quality, Report, Step, Value
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id
 from .version import __version__
 
 __all__ = [
-    "Batch", "Camera", "Client", "Credentials", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
+    "Batch", "Camera", "Client", "Credentials", "DataReport", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
     "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model", "NotFound", "ObjectInfo", "Parameter",
-    "Permutation", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
+    "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
     "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches", "TouchstoneError", "Value", "__version__",
     "box_touches", "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches", "write_measurements",
 ]

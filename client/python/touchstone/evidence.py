@@ -8,7 +8,7 @@ import io
 import os
 import pathlib
 from collections.abc import Mapping, Sequence
-from typing import Union
+from typing import Any, Union
 
 from . import checks
 from .errors import InvalidRequest
@@ -24,7 +24,7 @@ class Mesh:
 
     Attributes:
       path: .off, .obj, .stl or .ply.
-      unit: "mm", "cm", "m" or "in".
+      unit: "mm", "cm", "m" or "inch".
       up: "x", "y" or "z".
       scale: applied after the unit; 1: as is.
     """
@@ -114,5 +114,15 @@ def _mesh(name: str, given: MeshLike) -> diagnosis_pb2.MeshFile:
     if form not in _FORMATS:
         raise InvalidRequest(f"The mesh of {name!r} is {path}; its name must end in .{', .'.join(_FORMATS)}.")
     return diagnosis_pb2.MeshFile(
-        name=name, format=form, data=_read(path), unit=mesh.unit, up=mesh.up, scale=checks.positive("scale", mesh.scale)
+        name=name, format=_number("format", form, diagnosis_pb2.MeshFile.Format), data=_read(path),
+        unit=_number("unit", mesh.unit, diagnosis_pb2.MeshFile.LengthUnit),
+        up=_number("up", mesh.up, diagnosis_pb2.MeshFile.Axis), scale=checks.positive("scale", mesh.scale),
     )
+
+
+def _number(what: str, name: str, enum: Any) -> Any:
+    """The number of a name of the protocol's, which is written in capitals there."""
+    names = [known for known, number in enum.items() if number != 0]
+    if name.upper() not in names:
+        raise InvalidRequest(f"{what} = {name!r}; one of {', '.join(known.lower() for known in names)} was expected.")
+    return enum.Value(name.upper())

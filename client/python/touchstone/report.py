@@ -35,8 +35,51 @@ class Value:
 
 
 @dataclasses.dataclass(frozen=True)
+class Quality:
+    """How wrong a model is on one kind of measurement, in the unit of its DataReport.
+
+    Attributes:
+      rmse: as compare() finds it.
+      heldout_rmse: on measurements that the fit did not see.
+      lack_of_fit_p: probability of at least this much misfit beyond noise if nothing were missing.
+    """
+
+    rmse: float
+    heldout_rmse: float
+    lack_of_fit_p: float
+
+
+@dataclasses.dataclass(frozen=True)
+class DataReport:
+    """What one kind of measurement says.
+
+    Attributes:
+      kind: "touches", "photographs", "boards" or "distributions" (touches without poses).
+      unit: of every error: "us", "grey" (levels of 255) or "px".
+      session: path or name of the measurements.
+      emulated: an emulator made them, or some: they measure nothing.
+      count: touches or pictures that took part.
+      noise_floor: what no model can go below; 0: unknown.
+      initial, final: of the given and of the improved model; None if nothing could be compared.
+      after_step: after each of Report.steps.
+      message: all of it, touchstone.v1.DataReport.
+    """
+
+    kind: str
+    unit: str
+    session: str
+    emulated: bool
+    count: int
+    noise_floor: float
+    initial: Quality | None
+    after_step: tuple[Quality, ...]
+    final: Quality | None
+    message: diagnosis_pb2.DataReport
+
+
+@dataclasses.dataclass(frozen=True)
 class Step:
-    """An effect to add.
+    """An effect to add. Its errors are those of DataReport.after_step, at its place in the list.
 
     Attributes:
       effect: its name.
@@ -44,8 +87,7 @@ class Step:
       probability: of it, with its equivalents, among all that could take its place.
       values: its parameters.
       words: where it acts, if not everywhere, and what to doubt.
-      rmse_us, heldout_rmse_us: of touches with this step and all before; NaN without touches.
-      rmse_grey, heldout_rmse_grey: the same of photographs.
+      shown_by: of a joint diagnosis, the kinds of measurement that show it.
     """
 
     effect: str
@@ -53,10 +95,7 @@ class Step:
     probability: float
     values: tuple[Value, ...]
     words: str
-    rmse_us: float
-    heldout_rmse_us: float
-    rmse_grey: float
-    heldout_rmse_grey: float
+    shown_by: tuple[str, ...]
 
 
 class Report:
@@ -84,47 +123,59 @@ class Report:
         return tuple(self.message.warnings)
 
     @property
+    def data(self) -> tuple[DataReport, ...]:
+        """One entry per kind of measurement, and per session where there are several."""
+        return tuple(map(_data, self.message.data))
+
+    def of(self, kind: str) -> DataReport | None:
+        """The first entry of "touches", "photographs", "boards" or "distributions"; None: there is none."""
+        return next((data for data in self.data if data.kind == kind), None)
+
+    @property
     def rmse_us(self) -> float:
         """Of the given model on touches; NaN without touches."""
-        return self.message.initial.rmse_us if self.message.touches else math.nan
+        return self._rmse("touches", "initial")
 
     @property
     def rmse_grey(self) -> float:
         """Of the given model on photographs, grey levels of 255; NaN without photographs."""
-        return self.message.initial.rmse_grey if self.message.images else math.nan
+        return self._rmse("photographs", "initial")
 
     @property
     def final_rmse_us(self) -> float:
         """Of the improved model on touches; NaN without touches."""
-        return self.message.final.rmse_us if self.message.touches else math.nan
+        return self._rmse("touches", "final")
 
     @property
     def final_rmse_grey(self) -> float:
         """Of the improved model on photographs; NaN without photographs."""
-        return self.message.final.rmse_grey if self.message.images else math.nan
+        return self._rmse("photographs", "final")
 
     @property
     def noise_floor_us(self) -> float:
         """What no model of touches can go below; NaN without touches."""
-        return self.message.noise_floor_us if self.message.touches else math.nan
+        data = self.of("touches") or self.of("distributions")
+        return data.noise_floor if data else math.nan
 
     @property
     def noise_floor_grey(self) -> float:
         """What no model of photographs can go below; NaN without photographs."""
-        return self.message.noise_floor_grey if self.message.images else math.nan
+        data = self.of("photographs")
+        return data.noise_floor if data else math.nan
 
     @property
     def steps(self) -> tuple[Step, ...]:
         """The effects to add, in this order."""
-        touches, images = bool(self.message.touches), bool(self.message.images)
         return tuple(
-            Step(
-                step.effect, tuple(step.equivalent), step.probability, tuple(map(_value, step.parameters)), step.words,
-                step.rmse_us if touches else math.nan, step.heldout_rmse_us if touches else math.nan,
-                step.rmse_grey if images else math.nan, step.heldout_rmse_grey if images else math.nan,
-            )
+            Step(step.effect, tuple(step.equivalent), step.probability, tuple(map(_value, step.parameters)), step.words,
+                 tuple(map(_kind, step.shown_by)))
             for step in self.message.steps
         )
+
+    def _rmse(self, kind: str, when: str) -> float:
+        data = self.of(kind)
+        quality = getattr(data, when) if data else None
+        return quality.rmse if quality else math.nan
 
     @property
     def improved_model(self) -> str:
@@ -136,7 +187,7 @@ class Report:
         """The touches to make next, as read_plan() gives those of a file."""
         return [
             Row(number, proposed.object, Touches.from_messages([proposed.touch]))
-            for number, proposed in enumerate(self.message.next_touches)
+            for number, proposed in enumerate(one for one in self.message.next if one.HasField("touch"))
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -163,6 +214,22 @@ class Report:
     def __repr__(self) -> str:
         effects = ", ".join(step.effect for step in self.message.steps)
         return f"Report({self.verdict or 'compared'}{': ' + effects if effects else ''})"
+
+
+def _kind(number: int) -> str:
+    return diagnosis_pb2.DataReport.Kind.Name(number).lower()
+
+
+def _quality(message: diagnosis_pb2.Quality) -> Quality:
+    return Quality(message.rmse, message.heldout_rmse, message.lack_of_fit_p)
+
+
+def _data(message: diagnosis_pb2.DataReport) -> DataReport:
+    return DataReport(
+        _kind(message.kind), message.unit, message.session, message.emulated, message.count, message.noise_floor,
+        _quality(message.initial) if message.HasField("initial") else None, tuple(map(_quality, message.after_step)),
+        _quality(message.final) if message.HasField("final") else None, message,
+    )
 
 
 def _value(p: diagnosis_pb2.ParameterValue) -> Value:

@@ -173,8 +173,7 @@ absl::Status ImproveModel(const model::Model& model, BoardDiagnosis* diagnosis) 
     TOUCHSTONE_ASSIGN_OR_RETURN(
         improved, model::AddEffect(improved, step.effect, Assignments(step), effects::Catalogue()));
   }
-  diagnosis->improved_model_yaml = model::FormatModel(improved);
-  diagnosis->improved_model_hash = improved.Hash();
+  diagnosis->improved_model = std::move(improved);
   return absl::OkStatus();
 }
 

@@ -63,9 +63,9 @@ struct BoardDiagnosis {
   BoardNoise noise;
   std::vector<BoardStep> steps;
   std::vector<BoardRest> rest;
-  int pictures_needed = 0;               // with kTooLittleData
-  LensVector lens = LensVector::Zero();  // beside the nominal one, with all steps
-  std::string improved_model_yaml, improved_model_hash;
+  int pictures_needed = 0;                     // with kTooLittleData
+  LensVector lens = LensVector::Zero();        // beside the nominal one, with all steps
+  std::optional<model::Model> improved_model;  // none: nothing changed
   std::string summary;
   std::vector<std::string> warnings;
   double duration_s = 0;

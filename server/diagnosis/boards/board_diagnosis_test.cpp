@@ -44,7 +44,7 @@ TEST(BoardDiagnosis, ClaimsNothingWhereTheLensIsTheNominalOne) {
   for (uint64_t seed = 0; seed < (kUnderSanitizers ? 3 : 30); ++seed) {
     const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensVector::Zero(), 12, 0.2, 100 + seed));
     claims += diagnosis.verdict != Verdict::kAdequate;
-    EXPECT_TRUE(diagnosis.improved_model_yaml.empty() || !diagnosis.steps.empty());
+    EXPECT_TRUE(!diagnosis.improved_model || !diagnosis.steps.empty());
   }
   EXPECT_EQ(claims, 0);
 }
@@ -87,10 +87,8 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
   EXPECT_LT(std::abs(Find(diagnosis, "k1")->value + 0.28), 0.02);
   for (const BoardStep& step : diagnosis.steps) EXPECT_GT(step.probability, 0.99) << step.effect;
   // Through the improved model nothing is missing any more.
-  const absl::StatusOr<model::Model> improved =
-      model::ParseModel(diagnosis.improved_model_yaml, "improved", effects::Catalogue());
-  ASSERT_TRUE(improved.ok()) << improved.status();
-  EXPECT_EQ(Diagnosed(set, *improved).verdict, Verdict::kAdequate);
+  ASSERT_TRUE(diagnosis.improved_model);
+  EXPECT_EQ(Diagnosed(set, *diagnosis.improved_model).verdict, Verdict::kAdequate);
 }
 
 TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {

@@ -147,7 +147,7 @@ void ProblemList::AddMeshUnit(const MeshUnit& wrong) {
                                                 : absl::StrCat("unit=", wrong.unit);
   const double after_s = RmseOf(wrong.fixed, pool_);
   problems_.push_back(
-      {"units_length", absl::StrCat("mesh of ", meshes, " x ", factor),
+      {ProblemKind::kUnitsLength, absl::StrCat("mesh of ", meshes, " x ", factor),
        absl::StrCat("It looks as if the mesh of ", meshes, " is in another unit: ", factor,
                     " times as large it fits the touches. Name it as --mesh ", wrong.objects[0], "=FILE,",
                     option, ". Then the model as it is would be off by ", TimeInWords(after_s),
@@ -162,7 +162,7 @@ void ProblemList::AddDuplicates(const touches::Observations& o) {
   session::MeasurementFix fix;
   fix.drop_duplicates = true;
   problems_.push_back(
-      {"duplicates", absl::StrCat(duplicates.rows, " of ", set.size(), " rows"),
+      {ProblemKind::kDuplicates, absl::StrCat(duplicates.rows, " of ", set.size(), " rows"),
        absl::StrFormat(
            "%d of %d rows repeat an earlier touch to the last digit under another number (the first is "
            "touch %d); no rig repeats like that. Taken for repeats they make the noise look smaller and "
@@ -181,7 +181,7 @@ void ProblemList::AddSortedColumn(const TrialResult& before) {
   if (finger < 0) return;
   const std::string column = absl::StrCat("t_", model::FingerName(finger, input_.set->fingers), "_us");
   problems_.push_back(
-      {"row_shift", column + " is sorted",
+      {ProblemKind::kRowShift, column + " is sorted",
        absl::StrCat("The column ", column,
                     " is sorted from the first row to the last, although the "
                     "model expects it to go up and down: it was sorted without the other columns, and "

@@ -15,10 +15,12 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using engine::ProblemKind;
+
 struct Case {
   const char* name;
   MeasurementFix spoil;
-  const char* kind;
+  ProblemKind kind;
   const char* detail;
   const char* fix;
 };
@@ -34,52 +36,54 @@ std::vector<Case> Cases() {
       {"l and m", With([](auto* f) {
          f->finger_order = {1, 0, 2};
        }),
-       "finger_order", "l <-> m", "--swap-fingers l,m"},
+       ProblemKind::kFingerOrder, "l <-> m", "--swap-fingers l,m"},
       {"turned fingers", With([](auto* f) {
          f->finger_order = {2, 0, 1};
        }),
-       "finger_order", "l, m, r hold m, r, l", "--finger-order m,r,l"},
-      {"lateral", With([](auto* f) { f->reverse_lateral = true; }), "lateral_reversed", "",
+       ProblemKind::kFingerOrder, "l, m, r hold m, r, l", "--finger-order m,r,l"},
+      {"lateral", With([](auto* f) { f->reverse_lateral = true; }), ProblemKind::kLateralReversed, "",
        "--reverse-lateral"},
-      {"approach", With([](auto* f) { f->reverse_approach = true; }), "approach_reversed", "",
+      {"approach", With([](auto* f) { f->reverse_approach = true; }), ProblemKind::kApproachReversed, "",
        "--reverse-approach"},
       {"names", With([](auto* f) {
          f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
        }),
-       "object_names", "lat10 <-> lat20", "--swap-objects lat10,lat20"},
+       ProblemKind::kObjectNames, "lat10 <-> lat20", "--swap-objects lat10,lat20"},
       {"turned names", With([](auto* f) {
          f->rename_objects = {{"lat00", "lat10"}, {"lat10", "lat20"}, {"lat20", "lat00"}};
        }),
-       "object_names", "", "--rename-object"},
-      {"turned frame", With([](auto* f) { f->axes = *session::ParseAxes("y,-x,z"); }), "frame",
+       ProblemKind::kObjectNames, "", "--rename-object"},
+      {"turned frame", With([](auto* f) { f->axes = *session::ParseAxes("y,-x,z"); }), ProblemKind::kFrame,
        "x,y,z -> -y,x,z", "--permute-axes=-y,x,z"},
-      {"y up", With([](auto* f) { f->axes = *session::ParseAxes("x,z,-y"); }), "frame", "x,y,z -> x,-z,y",
-       "--permute-axes=x,-z,y"},
-      {"mirrored", With([](auto* f) { f->axes = *session::ParseAxes("y,x,z"); }), "frame", "",
+      {"y up", With([](auto* f) { f->axes = *session::ParseAxes("x,z,-y"); }), ProblemKind::kFrame,
+       "x,y,z -> x,-z,y", "--permute-axes=x,-z,y"},
+      {"mirrored", With([](auto* f) { f->axes = *session::ParseAxes("y,x,z"); }), ProblemKind::kFrame, "",
        "--permute-axes="},
-      {"times in tenths", With([](auto* f) { f->scale_times = 0.1; }), "units_time", "times x 10",
+      {"times in tenths", With([](auto* f) { f->scale_times = 0.1; }), ProblemKind::kUnitsTime, "times x 10",
        "--scale-times 10"},
-      {"times in ms", With([](auto* f) { f->scale_times = 1e-3; }), "units_time", "times x 1000",
+      {"times in ms", With([](auto* f) { f->scale_times = 1e-3; }), ProblemKind::kUnitsTime, "times x 1000",
        "--scale-times 1000"},
-      {"times in s", With([](auto* f) { f->scale_times = 1e-6; }), "units_time", "times x 1000000",
+      {"times in s", With([](auto* f) { f->scale_times = 1e-6; }), ProblemKind::kUnitsTime, "times x 1000000",
        "--scale-times 1e+06"},
-      {"times in ns", With([](auto* f) { f->scale_times = 1e3; }), "units_time", "times x 1/1000",
+      {"times in ns", With([](auto* f) { f->scale_times = 1e3; }), ProblemKind::kUnitsTime, "times x 1/1000",
        "--scale-times 0.001"},
-      {"speed doubled", With([](auto* f) { f->scale_speed = 2; }), "speed_factor", "speed x 1/2",
+      {"speed doubled", With([](auto* f) { f->scale_speed = 2; }), ProblemKind::kSpeedFactor, "speed x 1/2",
        "--scale-speed 0.5"},
-      {"speed in mm/min", With([](auto* f) { f->scale_speed = 60; }), "speed_factor", "speed x 1/60",
-       "--scale-speed"},
-      {"speed in m/s", With([](auto* f) { f->scale_speed = 1e-3; }), "speed_factor", "speed x 1000",
-       "--scale-speed 1000"},
-      {"targets in m", With([](auto* f) { f->scale_targets = f->scale_standoff = 1e-3; }), "units_length", "",
-       "--scale-"},
-      {"targets in inches", With([](auto* f) { f->scale_targets = 1 / 25.4; }), "units_length",
+      {"speed in mm/min", With([](auto* f) { f->scale_speed = 60; }), ProblemKind::kSpeedFactor,
+       "speed x 1/60", "--scale-speed"},
+      {"speed in m/s", With([](auto* f) { f->scale_speed = 1e-3; }), ProblemKind::kSpeedFactor,
+       "speed x 1000", "--scale-speed 1000"},
+      {"targets in m", With([](auto* f) { f->scale_targets = f->scale_standoff = 1e-3; }),
+       ProblemKind::kUnitsLength, "", "--scale-"},
+      {"targets in inches", With([](auto* f) { f->scale_targets = 1 / 25.4; }), ProblemKind::kUnitsLength,
        "targets x 25.4", "--scale-targets 25.4"},
-      {"a row down", With([](auto* f) { f->shift_rows = 1; }), "row_shift", "-1 row", "--shift-rows=-1"},
-      {"a row up", With([](auto* f) { f->shift_rows = -1; }), "row_shift", "+1 row", "--shift-rows=1"},
-      {"20 mm lower", move({"lat00", "lat10", "lat20"}, 0.020), "object_origin", "z -20.0 mm",
+      {"a row down", With([](auto* f) { f->shift_rows = 1; }), ProblemKind::kRowShift, "-1 row",
+       "--shift-rows=-1"},
+      {"a row up", With([](auto* f) { f->shift_rows = -1; }), ProblemKind::kRowShift, "+1 row",
+       "--shift-rows=1"},
+      {"20 mm lower", move({"lat00", "lat10", "lat20"}, 0.020), ProblemKind::kObjectOrigin, "z -20.0 mm",
        "--move-object lat00=0,0,-20 "},
-      {"one 15 mm higher", move({"lat10"}, -0.015), "object_origin", "z: lat10 +1",
+      {"one 15 mm higher", move({"lat10"}, -0.015), ProblemKind::kObjectOrigin, "z: lat10 +1",
        "--move-object lat10=0,0,1"},
   };
 }
@@ -108,7 +112,7 @@ TEST(DataProblems, AMeshThatTheSetDoesNotNameIsFound) {
   input.surfaces["lat10"] = touches::TestSurface("lat05");
   const auto problems = ProblemsOf(input);
   ASSERT_EQ(problems.size(), 1u);
-  EXPECT_EQ(problems[0].kind, "wrong_mesh");
+  EXPECT_EQ(problems[0].kind, ProblemKind::kWrongMesh);
   EXPECT_EQ(problems[0].detail, "lat10 is elsewhere");
   EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--rename-object lat10=elsewhere"));
 }
@@ -120,7 +124,7 @@ TEST(DataProblems, AnOriginAtTheFootOfTheObjectIsFound) {
       set->target_m[row].z() -= right.surfaces.at(set->objects[set->object[row]])->bounds().min_m.z();
   }));
   ASSERT_FALSE(problems.empty());
-  EXPECT_EQ(problems[0].kind, "object_origin");
+  EXPECT_EQ(problems[0].kind, ProblemKind::kObjectOrigin);
   EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--move-object lat10=0,0,"));
 }
 
@@ -145,7 +149,7 @@ TEST(DataProblems, CopiesUnderNewNumbersAreCountedAndDropped) {
     }
   }));
   ASSERT_EQ(problems.size(), 1u);
-  EXPECT_EQ(problems[0].kind, "duplicates");
+  EXPECT_EQ(problems[0].kind, ProblemKind::kDuplicates);
   EXPECT_EQ(problems[0].detail, "72 of 144 rows");
   EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--drop-duplicates"));
 }
@@ -218,7 +222,8 @@ TEST(DataProblems, StrongPhysicsIsNoMistake) {
       if (seed % 2 == 0) rig.samples_per_face = 1, rig.rounds = 1;  // 30 touches
       const auto problems = ProblemsOf(MakeFile(rig));
       EXPECT_TRUE(problems.empty()) << (rigs[r].empty() ? "nothing" : rigs[r][0].first) << ", seed " << seed
-                                    << ": " << problems[0].kind << ", " << problems[0].words;
+                                    << ": " << static_cast<int>(problems[0].kind) << ", "
+                                    << problems[0].words;
     }
 }
 

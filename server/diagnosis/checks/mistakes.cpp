@@ -57,7 +57,7 @@ void AddFingerOrders(int fingers, std::vector<Mistake>* mistakes) {
       moved.push_back(name(i));
       holds.push_back(name(order[i]));
     }
-    Mistake mistake{"finger_order", "", "", {}, {}};
+    Mistake mistake{ProblemKind::kFingerOrder, "", "", {}, {}};
     mistake.fix.finger_order = order;
     if (moved.size() == 2) {
       mistake.detail = absl::StrCat(moved[0], " <-> ", moved[1]);
@@ -74,14 +74,14 @@ void AddFingerOrders(int fingers, std::vector<Mistake>* mistakes) {
 }
 
 void AddReversals(std::vector<Mistake>* mistakes) {
-  Mistake lateral{"lateral_reversed",
+  Mistake lateral{ProblemKind::kLateralReversed,
                   "lateral -> -lateral",
                   "the lateral vectors point from the last finger to the first",
                   {},
                   {}};
   lateral.fix.reverse_lateral = true;
   mistakes->push_back(lateral);
-  Mistake approach{"approach_reversed",
+  Mistake approach{ProblemKind::kApproachReversed,
                    "approach -> -approach",
                    "the approach vectors point against the direction of motion",
                    {},
@@ -89,7 +89,7 @@ void AddReversals(std::vector<Mistake>* mistakes) {
   approach.fix.reverse_approach = true;
   mistakes->push_back(approach);
   // A tool frame whose z axis points the other way.
-  Mistake both{"approach_reversed",
+  Mistake both{ProblemKind::kApproachReversed,
                "approach -> -approach, lateral -> -lateral",
                "approach and lateral vectors both point the wrong way",
                {},
@@ -102,7 +102,8 @@ void AddUnitsOfTime(std::vector<Mistake>* mistakes) {
   static constexpr Factor kFactors[] = {{10, ""},  {100, ""},  {1000, "milliseconds"}, {1e6, "seconds"},
                                         {0.1, ""}, {0.01, ""}, {1e-3, "nanoseconds"},  {1e-6, "picoseconds"}};
   for (const Factor& factor : kFactors) {
-    Mistake mistake{"units_time", absl::StrCat("times x ", FactorInWords(factor.factor)), "", {}, {}};
+    Mistake mistake{
+        ProblemKind::kUnitsTime, absl::StrCat("times x ", FactorInWords(factor.factor)), "", {}, {}};
     const bool named = std::abs(std::log10(factor.factor)) >= 3;
     mistake.words = named ? absl::StrCat("the times are ", factor.words, ", not microseconds")
                           : absl::StrCat("the times are ",
@@ -132,7 +133,7 @@ void AddSpeeds(std::vector<Mistake>* mistakes) {
                                         {0.2, "five times what the arm did"},
                                         {5, "a fifth of what the arm did"}};
   for (const Factor& factor : kFactors) {
-    Mistake mistake{"speed_factor",
+    Mistake mistake{ProblemKind::kSpeedFactor,
                     absl::StrCat("speed x ", FactorInWords(factor.factor)),
                     absl::StrCat("the speeds of the file are ", factor.words),
                     {},
@@ -151,25 +152,25 @@ void AddUnitsOfLength(std::vector<Mistake>* mistakes) {
                                         {1 / 25.4, "1/25.4 mm"}};
   for (const Factor& factor : kFactors) {
     const std::string text = FactorInWords(factor.factor);
-    Mistake all{"units_length",
+    Mistake all{ProblemKind::kUnitsLength,
                 absl::StrCat("targets, standoff and speed x ", text),
                 absl::StrCat("targets, standoffs and speeds are in ", factor.words, ", not millimetres"),
                 {},
                 {}};
     all.fix.scale_targets = all.fix.scale_standoff = all.fix.scale_speed = factor.factor;
-    Mistake lengths{"units_length",
+    Mistake lengths{ProblemKind::kUnitsLength,
                     absl::StrCat("targets and standoff x ", text),
                     absl::StrCat("targets and standoffs are in ", factor.words, ", not millimetres"),
                     {},
                     {}};
     lengths.fix.scale_targets = lengths.fix.scale_standoff = factor.factor;
-    Mistake targets{"units_length",
+    Mistake targets{ProblemKind::kUnitsLength,
                     absl::StrCat("targets x ", text),
                     absl::StrCat("the targets are in ", factor.words, ", not millimetres"),
                     {},
                     {}};
     targets.fix.scale_targets = factor.factor;
-    Mistake standoff{"units_length",
+    Mistake standoff{ProblemKind::kUnitsLength,
                      absl::StrCat("standoff x ", text),
                      absl::StrCat("the standoffs are in ", factor.words, ", not millimetres"),
                      {},
@@ -182,8 +183,11 @@ void AddUnitsOfLength(std::vector<Mistake>* mistakes) {
 void AddShifts(std::vector<Mistake>* mistakes) {
   for (int size = 1; size <= kMaxShift; ++size)
     for (const int shift : {size, -size}) {
-      Mistake mistake{
-          "row_shift", absl::StrCat(shift > 0 ? "+" : "", shift, size == 1 ? " row" : " rows"), "", {}, {}};
+      Mistake mistake{ProblemKind::kRowShift,
+                      absl::StrCat(shift > 0 ? "+" : "", shift, size == 1 ? " row" : " rows"),
+                      "",
+                      {},
+                      {}};
       mistake.words = absl::StrCat("the times of each row belong to the touch ", size == 1 ? "" : "two rows ",
                                    shift > 0 ? "after" : "before", " it");
       mistake.fix.shift_rows = shift;
@@ -203,7 +207,7 @@ void AddFrames(std::vector<Mistake>* mistakes) {
       if (axes.isIdentity()) continue;
       const bool mirrored = axes.determinant() < 0;
       const std::string text = session::FormatAxes(axes);
-      Mistake mistake{"frame", absl::StrCat("x,y,z -> ", text), "", {}, {}};
+      Mistake mistake{ProblemKind::kFrame, absl::StrCat("x,y,z -> ", text), "", {}, {}};
       mistake.words = absl::StrCat("targets and vectors are in a ", mirrored ? "mirrored" : "turned",
                                    " frame: the object's x, y, z are the file's ", text);
       mistake.fix.axes = axes;

@@ -4,13 +4,17 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/engine/result.h"
 #include "server/session/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 
+using engine::ProblemKind;
+
 struct Mistake {
-  std::string kind, detail;  // of v1::DataProblem
-  std::string words;         // "columns l and m of the times are exchanged", to follow "It looks as if"
+  ProblemKind kind = ProblemKind::kFingerOrder;
+  std::string detail;  // as of DataProblem
+  std::string words;   // "columns l and m of the times are exchanged", to follow "It looks as if"
   session::MeasurementFix fix;
   std::vector<std::string> objects;  // that it concerns, by their names in the file; empty: all
   bool free_size = false;            // a size was fitted, not only tried

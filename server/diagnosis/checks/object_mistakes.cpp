@@ -110,7 +110,7 @@ std::vector<Mistake> MisnamedObjects(const Trial& trial, const TrialResult& befo
   for (const auto& [old_name, name] : mistake.fix.rename_objects) to.push_back(name);
   std::sort(from.begin(), from.end());
   std::sort(to.begin(), to.end());
-  mistake.kind = from == to ? "object_names" : "wrong_mesh";
+  mistake.kind = from == to ? ProblemKind::kObjectNames : ProblemKind::kWrongMesh;
   if (from == to && from.size() == 2) {
     mistake.fix.rename_objects = {{from[0], from[1]}, {from[1], from[0]}};
     mistake.detail = absl::StrCat(from[0], " <-> ", from[1]);
@@ -131,7 +131,7 @@ std::vector<Mistake> OriginsOfBoundingBox(const Trial& trial) {
   std::vector<Mistake> mistakes;
   for (int place = 0; place < 27; ++place) {
     const int at[3] = {place % 3, place / 3 % 3, place / 9};
-    Mistake mistake{"object_origin", "", "", {}, {}};
+    Mistake mistake{ProblemKind::kObjectOrigin, "", "", {}, {}};
     double largest_m = 0;
     for (const std::string& object : trial.input().set->objects) {
       const geometry::Bounds& bounds = trial.input().surfaces.at(object)->bounds();
@@ -159,7 +159,7 @@ std::vector<Mistake> OffsetOrigins(const Trial& trial, const TrialResult& before
   const absl::StatusOr<TrialResult> result = trial.Run(all);
   if (!result.ok()) return {};
 
-  Mistake mistake{"object_origin", "", "", {}, {}, true};
+  Mistake mistake{ProblemKind::kObjectOrigin, "", "", {}, {}, true};
   double sum_m = 0;
   for (size_t o = 0; o < objects.size(); ++o) {
     if (std::abs(offset_m[o]) < kMinOffsetM || !Explains(before, *result, objects[o])) continue;

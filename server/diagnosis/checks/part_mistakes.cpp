@@ -189,7 +189,7 @@ std::vector<Candidate> Candidates(const Trial& trial, const std::vector<Tried>& 
       const std::string& mesh = one.mistake.detail;
       if (objects[object] == mesh) continue;
       const bool known = std::find(objects.begin(), objects.end(), mesh) != objects.end();
-      Candidate candidate{{known ? "object_names" : "wrong_mesh",
+      Candidate candidate{{known ? ProblemKind::kObjectNames : ProblemKind::kWrongMesh,
                            absl::StrCat(objects[object], " is ", mesh),
                            "",
                            {},

@@ -8,6 +8,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using engine::ProblemKind;
+
 using ::testing::HasSubstr;
 
 // 3 objects, one after the other: 24 poses in each of 4 rounds, touches 0 to 287.
@@ -25,7 +27,7 @@ TEST(PartMistakes, FingersExchangedInSomeRoundsAreToldWithTheTouches) {
                                               f->finger_order = {1, 0, 2};
                                             })));
     ASSERT_FALSE(problems.empty());
-    EXPECT_EQ(problems[0].kind, "finger_order");
+    EXPECT_EQ(problems[0].kind, ProblemKind::kFingerOrder);
     EXPECT_THAT(problems[0].fix, HasSubstr("--touches 2"));
     EXPECT_THAT(problems[0].fix, HasSubstr("--swap-fingers l,m"));
     EXPECT_THAT(problems[0].words, HasSubstr(" of the 288 touches alone (touches 2"));
@@ -41,7 +43,7 @@ TEST(PartMistakes, TouchesOfOneObjectUnderTheNameOfAnotherAreTold) {
     input = Spoilt(input, With([](auto* f) { f->rename_objects = {{"lat10", "lat20"}}; }));
     const auto problems = ProblemsOf(input);
     ASSERT_FALSE(problems.empty());
-    EXPECT_EQ(problems[0].kind, "wrong_mesh");
+    EXPECT_EQ(problems[0].kind, ProblemKind::kWrongMesh);
     EXPECT_THAT(problems[0].detail, HasSubstr("lat20 is lat10, touches 9"));
     EXPECT_THAT(problems[0].words,
                 HasSubstr(" of the 192 touches that the file calls lat20 were touches of lat10"));
@@ -56,7 +58,7 @@ TEST(PartMistakes, TimesOfOneObjectInAnotherUnitAreTold) {
                                             f->scale_times = 1e-3;
                                           })));
   ASSERT_FALSE(problems.empty());
-  EXPECT_EQ(problems[0].kind, "units_time");
+  EXPECT_EQ(problems[0].kind, ProblemKind::kUnitsTime);
   EXPECT_THAT(problems[0].fix, HasSubstr("--scale-times 1000"));
 }
 
@@ -66,7 +68,7 @@ TEST(PartMistakes, TimesThatAreOneRowOffFromSomewhereOnAreTold) {
                                             f->shift_rows = 1;
                                           })));
   ASSERT_FALSE(problems.empty());
-  EXPECT_EQ(problems[0].kind, "row_shift");
+  EXPECT_EQ(problems[0].kind, ProblemKind::kRowShift);
   EXPECT_THAT(problems[0].fix, HasSubstr("--shift-rows=-1"));
 }
 
@@ -78,7 +80,7 @@ TEST(PartMistakes, NamesExchangedInOneRoundAreTwoPartsFixedOneAfterTheOther) {
                                 }));
   const auto problems = ProblemsOf(input);
   ASSERT_EQ(problems.size(), 2u);
-  for (const auto& problem : problems) EXPECT_EQ(problem.kind, "object_names");
+  for (const auto& problem : problems) EXPECT_EQ(problem.kind, ProblemKind::kObjectNames);
   EXPECT_THAT(problems[0].fix, ::testing::StartsWith("touchstone session fix set.csv --touches "));
   EXPECT_THAT(problems[1].fix, ::testing::StartsWith("touchstone session fix fixed.csv --touches "));
   EXPECT_THAT(problems[1].fix, ::testing::EndsWith("-o fixed2.csv"));
@@ -89,25 +91,27 @@ TEST(PartMistakes, NamesExchangedInOneRoundAreTwoPartsFixedOneAfterTheOther) {
 
 TEST(TwoMistakes, BothAreToldWithOneCommand) {
   struct Pair {
-    const char *name, *kinds[2], *options[2];
+    const char* name;
+    ProblemKind kinds[2];
+    const char* options[2];
     MeasurementFix spoil;
   };
   const std::vector<Pair> pairs = {
       {"fingers and times",
-       {"finger_order", "units_time"},
+       {ProblemKind::kFingerOrder, ProblemKind::kUnitsTime},
        {"--finger-order r,l,m", "--scale-times 10 "},
        With([](auto* f) {
          f->finger_order = {1, 2, 0}, f->scale_times = 0.1;
        })},
       {"names and fingers",
-       {"finger_order", "object_names"},
+       {ProblemKind::kFingerOrder, ProblemKind::kObjectNames},
        {"--swap-fingers l,m", "--swap-objects lat10,lat20"},
        With([](auto* f) {
          f->finger_order = {1, 0, 2};
          f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
        })},
       {"frame and times",
-       {"units_time", "frame"},
+       {ProblemKind::kUnitsTime, ProblemKind::kFrame},
        {"--scale-times 1000 ", "--permute-axes=-y,x,z"},
        With([](auto* f) { f->scale_times = 1e-3, f->axes = *session::ParseAxes("y,-x,z"); })},
   };
@@ -115,7 +119,7 @@ TEST(TwoMistakes, BothAreToldWithOneCommand) {
     SCOPED_TRACE(pair.name);
     const auto problems = ProblemsOf(Spoilt(FileOfRounds(3), pair.spoil));
     ASSERT_EQ(problems.size(), 2u);
-    std::vector<std::string> kinds = {problems[0].kind, problems[1].kind};
+    std::vector<ProblemKind> kinds = {problems[0].kind, problems[1].kind};
     EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(pair.kinds[0], pair.kinds[1])) << problems[0].words;
     EXPECT_EQ(problems[0].fix, problems[1].fix);
     for (const char* option : pair.options) EXPECT_THAT(problems[0].fix, HasSubstr(option));
@@ -136,7 +140,7 @@ TEST(MeshUnits, AMeshInAnotherUnitIsToldOfTheWholeSetAndOfOneObject) {
       }
       const auto problems = ProblemsOf(input);
       ASSERT_EQ(problems.size(), 1u);
-      EXPECT_EQ(problems[0].kind, "units_length");
+      EXPECT_EQ(problems[0].kind, ProblemKind::kUnitsLength);
       EXPECT_THAT(problems[0].detail, HasSubstr("mesh of lat"));
       EXPECT_THAT(problems[0].words, HasSubstr(factor == 1e-3 ? "lat20 is in another unit: 1000 times"
                                                : factor < 1   ? "lat20 is in another unit: 25.4 times"

@@ -56,7 +56,7 @@ std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set) 
     return std::nullopt;
   const bool red_is_wrong = reddish < bluish;
   CandidateMistake mistake;
-  mistake.kind = kChannelOrder;
+  mistake.kind = ProblemKind::kChannelOrder;
   mistake.fix.swap_channels = true;
   for (size_t row = 0; row < set.size(); ++row) {
     if (std::isnan(tints[row]) || (tints[row] > 0) != red_is_wrong) continue;

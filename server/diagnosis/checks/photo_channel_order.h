@@ -8,8 +8,6 @@
 
 namespace touchstone::diagnosis::checks {
 
-inline constexpr char kChannelOrder[] = "channel_order";
-
 // None where the pictures are grey, hardly coloured, or all of one order.
 std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set);
 

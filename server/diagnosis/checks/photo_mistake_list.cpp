@@ -14,7 +14,7 @@ namespace {
 
 using Mirror = session::ImageSetFix::Mirror;
 
-CandidateMistake OfSet(const char* kind, std::string detail, std::string words) {
+CandidateMistake OfSet(ProblemKind kind, std::string detail, std::string words) {
   CandidateMistake mistake;
   mistake.kind = kind;
   mistake.detail = std::move(detail);
@@ -25,14 +25,14 @@ CandidateMistake OfSet(const char* kind, std::string detail, std::string words) 
 void AddPictures(std::vector<CandidateMistake>* list) {
   for (const bool sideways : {true, false}) {
     CandidateMistake mistake =
-        OfSet("mirrored", sideways ? "left <-> right" : "top <-> bottom",
+        OfSet(ProblemKind::kMirrored, sideways ? "left <-> right" : "top <-> bottom",
               absl::StrCat("the pictures are mirrored, ", sideways ? "left to right" : "top to bottom"));
     mistake.fix.mirror = sideways ? Mirror::kLeftRight : Mirror::kUpDown;
     list->push_back(mistake);
   }
   for (const int turn_deg : {180, 90, 270}) {
     CandidateMistake mistake =
-        OfSet("rotated", absl::StrCat(turn_deg, " deg"),
+        OfSet(ProblemKind::kRotated, absl::StrCat(turn_deg, " deg"),
               turn_deg == 180 ? std::string("the pictures stand on their heads")
                               : absl::StrCat("the pictures are turned by 90 deg ",
                                              turn_deg == 90 ? "counter-clockwise" : "clockwise"));
@@ -50,7 +50,7 @@ void AddPictures(std::vector<CandidateMistake>* list) {
 void AddRows(std::vector<CandidateMistake>* list) {
   for (const int shift : {1, -1, 2, -2}) {
     CandidateMistake mistake =
-        OfSet("row_shift", absl::StrCat(shift > 0 ? "+" : "", shift),
+        OfSet(ProblemKind::kRowShift, absl::StrCat(shift > 0 ? "+" : "", shift),
               absl::StrCat("the pictures belong ", std::abs(shift) == 1 ? "one row" : "two rows", " further ",
                            shift > 0 ? "down" : "up", " in images.csv"));
     mistake.fix.shift_rows = shift;
@@ -68,7 +68,7 @@ void AddUnits(std::vector<CandidateMistake>* list) {
                                {10, "cm", "x 10"},
                                {0.001, "um", "x 1/1000"}}) {
     CandidateMistake mistake =
-        OfSet("units_length", length.told,
+        OfSet(ProblemKind::kUnitsLength, length.told,
               absl::StrCat("eye and at are in ", length.unit, " where mm are expected"));
     mistake.fix.scale_lengths = length.factor;
     list->push_back(mistake);
@@ -82,7 +82,7 @@ void AddAxes(std::vector<CandidateMistake>* list) {
       Eigen::Vector3d up = Eigen::Vector3d::Zero();
       up[axis] = sign;
       const std::string name = absl::StrCat(sign < 0 ? "-" : "", std::string(1, "xyz"[axis]));
-      CandidateMistake mistake = OfSet("up_axis", absl::StrCat("camera up = ", name),
+      CandidateMistake mistake = OfSet(ProblemKind::kUpAxis, absl::StrCat("camera up = ", name),
                                        absl::StrCat("the camera's up is ", name, " in every picture"));
       mistake.fix.up = up;
       list->push_back(mistake);
@@ -91,12 +91,12 @@ void AddAxes(std::vector<CandidateMistake>* list) {
   for (const char* axes : {"x,-z,y", "x,z,-y", "z,x,y", "y,z,x", "-z,y,x", "z,y,-x", "-y,x,z", "y,-x,z",
                            "-x,-y,z", "x,-y,-z", "-x,y,-z", "y,x,z", "x,y,-z", "x,z,y", "-x,y,z", "x,-y,z"}) {
     CandidateMistake mistake =
-        OfSet("up_axis", axes,
+        OfSet(ProblemKind::kUpAxis, axes,
               absl::StrCat("the poses are in another frame: the object's x, y, z are their ", axes));
     mistake.fix.axes = *session::ParseAxes(axes);
     list->push_back(mistake);
   }
-  CandidateMistake mistake = OfSet("eye_at", "eye <-> at", "eye and at are exchanged");
+  CandidateMistake mistake = OfSet(ProblemKind::kEyeAt, "eye <-> at", "eye and at are exchanged");
   mistake.fix.swap_eye_at = true;
   list->push_back(mistake);
 }
@@ -117,13 +117,13 @@ void AddCamera(std::vector<CandidateMistake>* list) {
                           {3, "3"},
                           {1.0 / 3, "1/3"}}) {
     CandidateMistake whole =
-        OfSet("focal_factor", absl::StrCat("camera x ", f.told),
+        OfSet(ProblemKind::kFocalFactor, absl::StrCat("camera x ", f.told),
               absl::StrCat("camera.yaml is of pictures of another size: fx, fy, cx and cy are ", f.told,
                            " times as large"));
     whole.fix.scale_camera = f.factor;
     list->push_back(whole);
     CandidateMistake focal =
-        OfSet("focal_factor", absl::StrCat("focal length x ", f.told),
+        OfSet(ProblemKind::kFocalFactor, absl::StrCat("focal length x ", f.told),
               absl::StrCat("the focal length is ", f.told, " times that of camera.yaml"));
     focal.fix.scale_focal = f.factor;
     list->push_back(focal);
@@ -174,10 +174,10 @@ std::vector<CandidateMistake> MistakesOfModels(const model::Model& model) {
         at += count;
       }
       if (!any) continue;
-      CandidateMistake mistake =
-          OfSet("units_angle", absl::StrCat(instance.effect->name, " x ", radians ? "180/pi" : "pi/180"),
-                absl::StrCat("the model gives the angle of ", instance.effect->name, " in ",
-                             radians ? "radians" : "degrees of degrees", ", where degrees are expected"));
+      CandidateMistake mistake = OfSet(
+          ProblemKind::kUnitsAngle, absl::StrCat(instance.effect->name, " x ", radians ? "180/pi" : "pi/180"),
+          absl::StrCat("the model gives the angle of ", instance.effect->name, " in ",
+                       radians ? "radians" : "degrees of degrees", ", where degrees are expected"));
       if (!radians)
         mistake.words = absl::StrCat("the angle of ", instance.effect->name,
                                      " was turned into degrees twice in the model");

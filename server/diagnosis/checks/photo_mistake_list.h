@@ -5,13 +5,17 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
 #include "server/session/image_set_fix.h"
 
 namespace touchstone::diagnosis::checks {
 
+using engine::ProblemKind;
+
 struct CandidateMistake {
-  std::string kind, detail;
+  ProblemKind kind = ProblemKind::kChannelOrder;
+  std::string detail;
   std::string words;  // to follow "It looks as if"
   session::ImageSetFix fix;
   std::shared_ptr<const model::Model> model;  // of a mistake in the model's values; else null

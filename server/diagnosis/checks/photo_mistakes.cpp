@@ -113,7 +113,7 @@ class MistakeSearch {
       const bool swapped = back != right.end() && back->second == name;
       if (swapped && other < name) continue;  // told with the other
       TriedMistake tried = how[name];
-      tried.mistake.kind = swapped ? "object_names" : "wrong_object";
+      tried.mistake.kind = swapped ? ProblemKind::kObjectNames : ProblemKind::kWrongObject;
       tried.mistake.detail = absl::StrCat(name, swapped ? " <-> " : " -> ", other);
       tried.mistake.words = swapped ? absl::StrCat("the names of ", name, " and ", other, " are exchanged")
                                     : absl::StrCat("what the set calls ", name, " is ", other);
@@ -154,7 +154,7 @@ class MistakeSearch {
     told.problem.words =
         absl::StrCat(first ? "It looks as if " : "These pictures cannot tell it from another mistake: ",
                      tried.mistake.words, ".");
-    if (tried.mistake.kind != kChannelOrder)
+    if (tried.mistake.kind != ProblemKind::kChannelOrder)
       absl::StrAppend(
           &told.problem.words,
           absl::StrFormat(" Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",

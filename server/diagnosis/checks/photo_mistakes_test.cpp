@@ -9,6 +9,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using engine::ProblemKind;
+
 using session::ImageSetFix;
 
 images::HiddenCamera SmallCamera() {
@@ -31,7 +33,7 @@ std::vector<PhotoMistake> Found(const DiagnosisInput& input) {
 }
 
 // Some of what is found has this kind, and its fix gives the pictures and poses back as they were.
-void ExpectFound(const ImageSetFix& mistake, const std::string& kind) {
+void ExpectFound(const ImageSetFix& mistake, ProblemKind kind) {
   SCOPED_TRACE(session::FixOptions(mistake));
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   const DiagnosisInput spoilt = Spoilt(input, mistake);
@@ -54,13 +56,13 @@ void ExpectFound(const ImageSetFix& mistake, const std::string& kind) {
 TEST(PhotoMistakes, MirroredAndTurnedPicturesAreFound) {
   ImageSetFix mistake;
   mistake.mirror = ImageSetFix::Mirror::kLeftRight;
-  ExpectFound(mistake, "mirrored");
+  ExpectFound(mistake, ProblemKind::kMirrored);
   mistake.mirror = ImageSetFix::Mirror::kUpDown;
-  ExpectFound(mistake, "mirrored");
+  ExpectFound(mistake, ProblemKind::kMirrored);
   for (const int turn_deg : {90, 180, 270}) {
     ImageSetFix turned;
     turned.rotate_deg = turn_deg;
-    ExpectFound(turned, "rotated");
+    ExpectFound(turned, ProblemKind::kRotated);
   }
 }
 
@@ -69,25 +71,25 @@ TEST(PhotoMistakes, AnotherCameraAndOtherLengthsAreFound) {
   for (const double factor : {0.5, 2.0, 1.5}) {
     ImageSetFix focal;
     focal.scale_focal = factor;
-    ExpectFound(focal, "focal_factor");
+    ExpectFound(focal, ProblemKind::kFocalFactor);
     ImageSetFix camera;
     camera.scale_camera = factor;
-    ExpectFound(camera, "focal_factor");
+    ExpectFound(camera, ProblemKind::kFocalFactor);
   }
   for (const double factor : {0.001, 1 / 25.4}) {
     ImageSetFix lengths;
     lengths.scale_lengths = factor;
-    ExpectFound(lengths, "units_length");
+    ExpectFound(lengths, ProblemKind::kUnitsLength);
   }
 }
 
 TEST(PhotoMistakes, PosesOfAnotherFrameAreFound) {
   ImageSetFix axes;
   axes.axes = *session::ParseAxes("x,-z,y");
-  ExpectFound(axes, "up_axis");
+  ExpectFound(axes, ProblemKind::kUpAxis);
   ImageSetFix exchanged;
   exchanged.swap_eye_at = true;
-  ExpectFound(exchanged, "eye_at");
+  ExpectFound(exchanged, ProblemKind::kEyeAt);
 }
 
 TEST(PhotoMistakes, ShiftedRowsAndExchangedNamesAreFound) {
@@ -96,13 +98,13 @@ TEST(PhotoMistakes, ShiftedRowsAndExchangedNamesAreFound) {
   shift.shift_rows = 1;
   std::vector<PhotoMistake> found = Found(Spoilt(input, shift));
   ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found[0].problem.kind, "row_shift");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kRowShift);
   EXPECT_EQ(found[0].fix.shift_rows, -1);
   ImageSetFix names;
   names.rename_objects = {{"lat00", "lat20"}, {"lat20", "lat00"}};
   found = Found(Spoilt(input, names));
   ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found[0].problem.kind, "object_names");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kObjectNames);
   EXPECT_EQ(found[0].problem.detail, "lat00 <-> lat20");
 }
 
@@ -114,7 +116,7 @@ TEST(PhotoMistakes, AnObjectOfAnotherMeshIsFound) {
   spoilt.surfaces["cup"] = images::PhotoTestSurface("lat05");
   const std::vector<PhotoMistake> found = Found(spoilt);
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_EQ(found[0].problem.kind, "wrong_object");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kWrongObject);
   EXPECT_EQ(found[0].problem.detail, "cup -> lat20");
 }
 
@@ -126,7 +128,7 @@ TEST(PhotoMistakes, RadiansInTheModelAreFound) {
       *input.model, {{"camera_rotation", {"rotation_deg=0.02617994,-0.01745329,0.03490659"}}}));
   const std::vector<PhotoMistake> found = Found(input);
   ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found[0].problem.kind, "units_angle");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kUnitsAngle);
   EXPECT_NE(found[0].problem.fix.find("rotation_deg=1.5,-1,2"), std::string::npos) << found[0].problem.fix;
 }
 
@@ -163,7 +165,7 @@ TEST(PhotoMistakes, AMistakeIsFoundBesideMissingPhysics) {
   mistake.rotate_deg = 90;
   const std::vector<PhotoMistake> found = Found(Spoilt(images::MakePhotoInput(rig), mistake));
   ASSERT_FALSE(found.empty());
-  EXPECT_EQ(found[0].problem.kind, "rotated");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kRotated);
   EXPECT_EQ(found[0].fix.rotate_deg, 270);
 }
 
@@ -186,7 +188,7 @@ TEST(PhotoMistakes, ChannelsAreFoundOnlyWherePicturesDisagree) {
   some.images = {{12, 17}};
   const std::vector<PhotoMistake> found = Found(Spoilt(input, some));
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_EQ(found[0].problem.kind, "channel_order");
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kChannelOrder);
   EXPECT_EQ(session::FixOptions(found[0].fix), "--images 12-17 --swap-channels");
 }
 

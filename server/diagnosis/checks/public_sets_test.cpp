@@ -14,6 +14,8 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
+using engine::ProblemKind;
+
 const std::string kFolder = SharedData() + "/measurements/";
 
 class PublicSets : public ::testing::Test {
@@ -48,17 +50,17 @@ TEST_F(PublicSets, PermutedFingersAreToldAndTheFixMendsTheFile) {
   ASSERT_TRUE(problems.ok()) << problems.status();
   ASSERT_EQ(problems->size(), 1u);
   const engine::DataProblem& problem = problems->front();
-  EXPECT_EQ(problem.kind, "finger_order");
+  EXPECT_EQ(problem.kind, ProblemKind::kFingerOrder);
   EXPECT_EQ(problem.detail, "l, m, r hold m, r, l");
   EXPECT_THAT(problem.fix, ::testing::HasSubstr("--finger-order m,r,l -o fixed.csv"));
-  EXPECT_LT(problem.error_after, 0.02 * problem.error_before);
+  EXPECT_LT(problem.rmse_after_s, 0.02 * problem.rmse_before_s);
 }
 
 TEST_F(PublicSets, SwappedObjectsAreTold) {
   const auto problems = FindDataProblems(Read("outside_objects_swapped"), {});
   ASSERT_TRUE(problems.ok()) << problems.status();
   ASSERT_EQ(problems->size(), 1u);
-  EXPECT_EQ(problems->front().kind, "object_names");
+  EXPECT_EQ(problems->front().kind, ProblemKind::kObjectNames);
   EXPECT_EQ(problems->front().detail, "lat10 <-> lat15");
   EXPECT_THAT(problems->front().fix, ::testing::HasSubstr("--swap-objects lat10,lat15 -o fixed.csv"));
 }

@@ -120,9 +120,36 @@ struct UnexplainedRest {
   double nearest_formula_share = 0;  // of the curve's gain, 0 to 1
 };
 
+// In the order of v1::DataProblem::Kind.
+enum class ProblemKind {
+  kFingerOrder,
+  kLateralReversed,
+  kApproachReversed,
+  kObjectNames,
+  kWrongMesh,
+  kFrame,
+  kUnitsTime,
+  kUnitsLength,
+  kSpeedFactor,
+  kRowShift,
+  kObjectOrigin,
+  kDuplicates,
+  kStaleRows,
+  // Of photographs alone.
+  kChannelOrder,
+  kMirrored,
+  kRotated,
+  kUnitsAngle,
+  kUpAxis,
+  kEyeAt,
+  kWrongObject,
+  kFocalFactor,
+};
+
 // A discrete mistake in a measurement file, and how to fix it.
 struct DataProblem {
-  std::string kind, detail;  // "finger_order", "l <-> m"; the kinds are those of v1::DataProblem
+  ProblemKind kind = ProblemKind::kFingerOrder;
+  std::string detail;  // "l <-> m"
   std::string words;         // a sentence for people, with the evidence
   std::string fix;           // the command that fixes the file; empty: none does
   double error_before = 0,

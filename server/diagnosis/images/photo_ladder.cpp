@@ -78,8 +78,7 @@ class PhotoLadder {
     if (!expectations_changed) after_->clear();
     if (!changed_) return absl::OkStatus();
     if (!improved_.name.empty()) improved_.name += "_better";
-    d_.improved_model_yaml = model::FormatModel(improved_);
-    d_.improved_model_hash = improved_.Hash();
+    d_.improved_model = improved_;
     return absl::OkStatus();
   }
 

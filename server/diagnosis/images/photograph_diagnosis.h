@@ -74,7 +74,7 @@ struct PhotographDiagnosis {
   std::vector<engine::DataProblem> data_problems;
   std::optional<engine::UnexplainedRest> unexplained;
   int images_needed = 0;  // with kTooLittleData
-  std::string improved_model_yaml, improved_model_hash;
+  std::optional<model::Model> improved_model;  // none: nothing changed
   std::vector<ProposedPhotograph> next_photographs;
 
   // Where.

@@ -1,56 +1,205 @@
-// All that a diagnosis says, as plain values in SI (parameters in the units of files). write_report.h turns it into
-// the wire message, summary.h into sentences.
+// All that a diagnosis says, whatever was measured, as plain values: errors, residuals and noise of an entry in the unit of
+// its kind, parameters in the units of files, the rest in SI. from_*.h make it of what each kind's engine found,
+// write_report.h turns it into the wire message, summary.h into sentences.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis::report {
 
-// What was compared as distributions, and how it came out.
-struct PoseFreeDiagnosis {
-  DiagnosisInput input;
-  distributions::PoseFreeComparison comparison;
+// In the order of v1::DataReport::Kind.
+enum class DataKind { kTouches, kPhotographs, kBoards, kDistributions };
+
+// "us", "grey" or "px".
+const char* UnitOf(DataKind kind);
+
+struct Quality {
+  double rmse = 0;  // as a comparison finds it
+  double heldout_rmse = 0;
+  double lack_of_fit_p = 0;  // 0 to 1
 };
+
+// As selection::NoiseFloor.
+struct NoiseFloor {
+  double sigma = 0;
+  double lower = 0, upper = 0;  // 95 % interval; 0 if unknown
+  double degrees_of_freedom = 0;
+  bool from_repeats = false;  // false: an upper bound
+  double declared = 0;        // what the model says that it is; 0: it gives no one value
+  // Of repeats that share a course in time, which is not noise; none: they do not.
+  struct TimeStructure {
+    double sigma = 0, z = 0;  // sigma of neighbours in time
+  };
+  std::optional<TimeStructure> time_structure;
+};
+
+// An effect to add, after all earlier ones. Its errors: DataReport::after_step.
+struct Step {
+  std::string effect;
+  engine::EffectScope scope = engine::EffectScope::kRig;
+  std::vector<std::string> equivalent;
+  std::string discriminating_measurement;
+  double probability = 0, gain_nats = 0;
+  std::vector<engine::ParameterEstimate> parameters;
+  std::string meaning, check_on_rig, remedy, words;
+  std::vector<DataKind> shown_by;  // of a joint diagnosis
+  model::Model model;  // with it and all before it; without effects where it changes no expectation
+};
+
+// One effect of the catalogue as the only step.
+struct Candidate {
+  std::string effect;
+  engine::EffectScope scope = engine::EffectScope::kRig;
+  engine::CandidateNote note = engine::CandidateNote::kNone;
+  double probability = 0, gain_nats = 0;
+  std::vector<engine::ParameterEstimate> parameters;  // empty unless it was fitted
+  double rmse = 0, heldout_rmse = 0;                     // 0 unless it was fitted
+};
+
+// A part of the data in which the model is wrong.
+struct Slice {
+  std::string conditions, words;  // "incidence > 12 deg and finger = r", "contact too early by 9.1 ms"
+  int count = 0;                  // touches or pictures with such a part
+  double mean_residual = 0, rmse = 0, share_of_excess_error = 0;
+};
+
+struct Group {
+  residuals::ErrorGroupKind kind = residuals::ErrorGroupKind::kObject;
+  std::string name;
+  int count = 0;
+  double rmse = 0, mean_residual = 0, share_of_excess_error = 0;
+};
+
+// The residual against one covariate.
+struct Curve {
+  struct Bin {
+    std::string finger;  // empty: of all
+    double centre = 0, mean_residual = 0, std_error = 0, after = 0;
+    int64_t count = 0;  // touches or pixels
+  };
+  struct OfFinger {
+    std::string finger;
+    double p = 1, p_after = 1;
+  };
+  std::string covariate, unit;  // the covariate's
+  std::vector<Bin> bins;
+  double p = 1, p_after = 1;
+  std::vector<OfFinger> fingers;
+};
+
+// What no effect of the catalogue explains; as selection::UnexplainedRest.
+struct Unexplained {
+  std::vector<engine::CovariateTest> covariates;
+  std::string formula, formula_yaml, lookup_yaml, words;
+  double rmse = 0, heldout_rmse = 0, heldout_gain = 0;  // with the formula, or the curve
+  std::vector<engine::ParameterEstimate> parameters;
+  std::string nearest_effect, nearest_formula;
+  double nearest_cosine = 0, nearest_formula_share = 0;
+  std::shared_ptr<const model::Effect> lookup;  // null: none
+};
+
+struct DataProblem {
+  engine::ProblemKind kind = engine::ProblemKind::kFingerOrder;
+  std::string detail, words, fix;
+  double error_before = 0, error_after = 0;  // in the unit of data[data_index]
+  int data_index = 0;
+};
+
+// The outlines and single pictures of photographs.
+struct PhotographDescription {
+  double silhouette_iou = 1, silhouette_iou_after = 1;
+  double contour_distance_px = 0, contour_distance_after_px = 0;
+  std::vector<images::PhotographError> photographs;
+  std::vector<images::PhotographMap> maps;
+  bool coloured = false;  // compared as the mean of three channels
+};
+
+// Measurements that took no part.
+struct SetAside {
+  struct Rows {
+    std::string reason;
+    int count = 0;
+    std::vector<uint64_t> examples;  // touch numbers
+  };
+  std::vector<Rows> rows;
+  int outliers = 0;  // among them
+
+  int count() const;
+};
+
+// What one kind of measurement says.
+struct DataReport {
+  DataKind kind = DataKind::kTouches;
+  std::string session;  // the path, or the session's name
+  int emulated = 0;     // rows that an emulator made: they measure nothing
+  int count = 0;        // touches or pictures that took part
+  SetAside set_aside;
+  int needed = 0;  // with kTooLittleData; 0: this kind has enough
+
+  // How wrong; none of them if nothing could be used.
+  std::optional<NoiseFloor> noise_floor;
+  std::optional<Quality> initial;   // the model as it was given
+  std::vector<Quality> after_step;  // one per step of the diagnosis
+  std::optional<Quality> final;     // after all steps and refits
+  double reducible_share = 0;       // of the mean square error that is not noise, 0 to 1
+
+  std::vector<Slice> where;
+  std::optional<Unexplained> unexplained;
+  std::vector<Candidate> candidates;
+
+  // What the set consists of.
+  int rows = 0, poses = 0, repeats = 0, rounds = 0, missed_contacts = 0;
+  std::vector<std::string> objects;
+  std::vector<double> speeds_mm_s;
+
+  std::vector<Group> groups;
+  std::vector<Curve> curves;
+
+  // Of touches, in seconds as residuals/ has them; slices, groups and curves stand above.
+  std::vector<std::string> fingers;
+  std::vector<double> finger_bias_s;
+  std::optional<residuals::FingerScatter> finger_scatter;
+  std::vector<residuals::WorstTouch> worst_touches;
+  std::vector<residuals::ComparedHistogram> histograms;
+  std::vector<residuals::ParityPoint> parity;
+  std::vector<residuals::SurfaceResidual> surface_points;
+  std::vector<residuals::DrawableObject> outlines;
+
+  std::optional<PhotographDescription> photographs;
+  std::optional<distributions::PoseFreeComparison> distributions;
+};
+
+using NextMeasurement = std::variant<design::ProposedTouch, images::ProposedPhotograph>;
 
 struct Diagnosis {
   engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;  // of the initial model
-  touches::DataSummary data;
+  std::vector<DataReport> data;        // one per kind and session
 
-  // How wrong; none of them if no touch could be used.
-  std::optional<engine::NoiseFloor> noise_floor;
-  std::optional<engine::Quality> initial;  // the model as it was given
-  std::optional<engine::Quality> final;    // after all steps and refits
-  double reducible_share = 0;              // of the mean square error that is not noise, 0 to 1
-
-  // Where.
-  residuals::ResidualSummary residuals;
-
-  // Why, and what to do.
   std::vector<engine::RefittedEffect> refitted;
-  std::vector<engine::LadderStep> steps;
+  std::vector<Step> steps;
   std::vector<engine::ConfoundedEffects> confounded;
-  std::vector<engine::RankedCandidate> candidates;
-  std::optional<engine::UnexplainedRest> unexplained;
-  std::vector<std::string> superfluous;                  // effects of the model that the data do without
-  std::vector<engine::DataProblem> data_problems;        // with kCheckData; no step is claimed beside them
-  int touches_needed = 0;                                // with kTooLittleData
-  std::string improved_model_yaml, improved_model_hash;  // empty if nothing changed
-  std::vector<design::ProposedTouch> next_touches;
+  std::vector<std::string> superfluous;        // effects of the model that the data do without
+  std::vector<DataProblem> data_problems;      // with kCheckData; no step is claimed beside them
+  std::optional<model::Model> improved_model;  // none: nothing changed
+  std::vector<NextMeasurement> next;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this
   double duration_s = 0;
-
-  std::optional<PoseFreeDiagnosis> pose_free;  // of a set without poses, instead of all the rest
 };
+
+// The share of a squared error that is the model's, not noise: 0 to 1.
+double ReducibleShare(const NoiseFloor& floor, double rmse);
 
 }  // namespace touchstone::diagnosis::report

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/diagnosis/report/diagnosis.h"
+#include "server/diagnosis/report/from_touches.h"
 
 namespace touchstone::diagnosis::report {
 
@@ -18,13 +18,12 @@ inline engine::ParameterEstimate RadiusMm() {
   return radius;
 }
 
-inline engine::LadderStep Step(const std::string& effect) {
-  engine::LadderStep step;
+inline Step ExampleStep(const std::string& effect) {
+  Step step;
   step.effect = effect;
   step.probability = 0.98;
   step.gain_nats = 1200;
   step.parameters = {RadiusMm()};
-  step.quality = {0.005, 0.00503, 0.4};
   step.meaning = "What it is.";
   step.check_on_rig = "Measure the tips.";
   step.remedy = "Keep the radius.";
@@ -32,30 +31,33 @@ inline engine::LadderStep Step(const std::string& effect) {
 }
 
 inline Diagnosis ExampleDiagnosis(engine::Verdict verdict) {
+  touches::DataSummary set;
+  set.origin = "set.csv";
+  set.fingers = 3;
+  set.rows = 962;
+  set.unused["at an edge"] = {2, {17, 45}};
+  set.objects = {"lat00", "lat20"};
+  set.touches = 960;
+  set.poses = 240;
+  set.repeats = 720;
+  set.rounds = 4;
+  set.speeds_mm_s = {20};
+  set.missed_contacts = 3;
   Diagnosis diagnosis;
   diagnosis.verdict = verdict;
   diagnosis.model_name = "nominal";
   diagnosis.model_hash = "354f";
-  diagnosis.data.origin = "set.csv";
-  diagnosis.data.fingers = 3;
-  diagnosis.data.rows = 962;
-  diagnosis.data.unused["at an edge"] = {2, {17, 45}};
-  diagnosis.data.objects = {"lat00", "lat20"};
-  diagnosis.data.touches = 960;
-  diagnosis.data.poses = 240;
-  diagnosis.data.repeats = 720;
-  diagnosis.data.rounds = 4;
-  diagnosis.data.speeds_mm_s = {20};
-  diagnosis.data.missed_contacts = 3;
-  diagnosis.noise_floor.emplace();
-  diagnosis.noise_floor->sigma = 0.005;
-  diagnosis.noise_floor->lower = 0.0048;
-  diagnosis.noise_floor->upper = 0.0052;
-  diagnosis.noise_floor->degrees_of_freedom = 1440;
-  diagnosis.noise_floor->from_repeats = true;
-  diagnosis.initial = {0.041, 0.0411, 1e-20};
-  diagnosis.final = {0.005, 0.00503, 0.4};
-  diagnosis.reducible_share = 0.985;
+  diagnosis.data = {DataOfTouches(set)};
+  DataReport& data = diagnosis.data[0];
+  data.noise_floor.emplace();
+  data.noise_floor->sigma = 5000;
+  data.noise_floor->lower = 4800;
+  data.noise_floor->upper = 5200;
+  data.noise_floor->degrees_of_freedom = 1440;
+  data.noise_floor->from_repeats = true;
+  data.initial = Quality{41000, 41100, 1e-20};
+  data.final = Quality{5000, 5030, 0.4};
+  data.reducible_share = 0.985;
   return diagnosis;
 }
 

@@ -1,45 +1,49 @@
 #include "server/diagnosis/report/message_parts.h"
 
+#include <algorithm>
+
 namespace touchstone::diagnosis::report {
 
 v1::Report::Verdict ToMessage(engine::Verdict verdict) {
-  switch (verdict) {
-    case engine::Verdict::kNone:
-      return v1::Report::VERDICT_UNSPECIFIED;
-    case engine::Verdict::kAdequate:
-      return v1::Report::ADEQUATE;
-    case engine::Verdict::kWrongValues:
-      return v1::Report::WRONG_VALUES;
-    case engine::Verdict::kMissingEffects:
-      return v1::Report::MISSING_EFFECTS;
-    case engine::Verdict::kUnexplained:
-      return v1::Report::UNEXPLAINED;
-    case engine::Verdict::kCheckData:
-      return v1::Report::CHECK_DATA;
-    case engine::Verdict::kTooLittleData:
-      return v1::Report::TOO_LITTLE_DATA;
-  }
-  return v1::Report::VERDICT_UNSPECIFIED;
+  static_assert(static_cast<int>(engine::Verdict::kTooLittleData) == v1::Report::TOO_LITTLE_DATA);
+  return static_cast<v1::Report::Verdict>(static_cast<int>(verdict));
 }
 
-const char* ToMessage(engine::EffectScope scope) {
-  return scope == engine::EffectScope::kObject ? "object" : "rig";
+v1::DataReport::Kind ToMessage(DataKind kind) {
+  static_assert(static_cast<int>(DataKind::kDistributions) + 1 == v1::DataReport::DISTRIBUTIONS);
+  return static_cast<v1::DataReport::Kind>(static_cast<int>(kind) + 1);
 }
 
-const char* ToMessage(engine::CandidateNote note) {
-  switch (note) {
-    case engine::CandidateNote::kNone:
-      return "";
-    case engine::CandidateNote::kInvisible:
-      return "this experiment cannot see it";
-    case engine::CandidateNote::kNeutral:
-      return "fits best where it changes nothing";
-    case engine::CandidateNote::kAtBound:
-      return "its best value lies at its bound";
-    case engine::CandidateNote::kLinearised:
-      return "not among the eight most probable; its gain is a linearised prediction";
+v1::Scope ScopeMessage(engine::EffectScope scope,
+                       const std::vector<engine::ParameterEstimate>& parameters) {
+  v1::Scope message;
+  message.set_kind(scope == engine::EffectScope::kObject ? v1::Scope::OBJECT : v1::Scope::RIG);
+  for (const engine::ParameterEstimate& estimate : parameters)
+    if (!estimate.object.empty() &&
+        std::count(message.objects().begin(), message.objects().end(), estimate.object) == 0)
+      message.add_objects(estimate.object);
+  return message;
+}
+
+void WriteParameters(const std::vector<engine::ParameterEstimate>& parameters,
+                     google::protobuf::RepeatedPtrField<v1::ParameterValue>* messages) {
+  for (const engine::ParameterEstimate& estimate : parameters) {
+    v1::ParameterValue* value = messages->Add();
+    value->set_name(estimate.name);
+    value->set_value(estimate.value);
+    value->set_std_error(estimate.std_error);
+    value->set_unit(estimate.unit);
+    value->set_finger(estimate.entry);
+    value->set_object(estimate.object);
+    value->set_lower(estimate.lower);
+    value->set_upper(estimate.upper);
+    if (estimate.before) value->set_before(*estimate.before);
+    for (const auto& [kind, std_error] : estimate.std_error_alone) {
+      v1::ErrorAlone* alone = value->add_alone();
+      alone->set_kind(kind == "touches" ? v1::DataReport::TOUCHES : v1::DataReport::PHOTOGRAPHS);
+      alone->set_std_error(std_error);
+    }
   }
-  return "";
 }
 
 }  // namespace touchstone::diagnosis::report

@@ -1,4 +1,4 @@
-// What a diagnosis says in sentences.
+// What a diagnosis says in sentences, whatever was measured.
 #pragma once
 
 #include <string>
@@ -8,13 +8,20 @@
 
 namespace touchstone::diagnosis::report {
 
+// An error of this kind for people: "41 ms", "12 grey levels", "0.31 px".
+std::string ErrorInWords(DataKind kind, double error);
+
 // "radius_mm 1.5 +- 0.005 mm, ..."; only how many where they are many.
 std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& parameters);
 
-// What limits the diagnosis: few objects, no repeats, few touches.
-std::vector<std::string> DataWarnings(const touches::DataSummary& data);
+// That an emulator made the data, or some; empty: it did not.
+std::string EmulatedInWords(const DataReport& data);
 
-// One paragraph: how wrong, why, what to do. `others_in_place`: effects that were found elsewhere are in the model already.
+// What limits what the data say: few objects, no repeats, few measurements, an emulator.
+std::vector<std::string> DataWarnings(const DataReport& data);
+
+// One paragraph: how wrong, why, what to do. Of a diagnosis with one entry of data. `others_in_place`: effects that were
+// found elsewhere are in the model already.
 std::string Summarize(const Diagnosis& diagnosis, bool others_in_place = false);
 
 }  // namespace touchstone::diagnosis::report

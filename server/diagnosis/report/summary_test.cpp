@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/report/example_diagnosis.h"
-#include "server/diagnosis/report/write_joint_report.h"
+#include "server/diagnosis/report/join.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -27,20 +27,20 @@ TEST(Summarize, BeginsWithTheErrorAndItsShareOfNoise) {
 
 TEST(Summarize, CallsAFloorWithoutRepeatsAnUpperBound) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
-  diagnosis.noise_floor->from_repeats = false;
+  diagnosis.data[0].noise_floor->from_repeats = false;
   EXPECT_THAT(Summarize(diagnosis), HasSubstr("5 ms is noise at most"));
 }
 
 TEST(Summarize, SaysThatRepeatsScatterByMoreThanTheModelSays) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
-  engine::NoiseFloor& floor = *diagnosis.noise_floor;
-  floor.sigma = 0.013, floor.lower = 0.0125, floor.upper = 0.0135;
+  NoiseFloor& floor = *diagnosis.data[0].noise_floor;
+  floor.sigma = 13000, floor.lower = 12500, floor.upper = 13500;
   floor.from_repeats = true;
   EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
-  floor.declared = 0.005;
+  floor.declared = 5000;
   EXPECT_THAT(Summarize(diagnosis),
               HasSubstr("Repeats scatter by 13 ms (12.5 ms to 13.5 ms), where the model says 5 ms of noise"));
-  floor.declared = 0.0133;
+  floor.declared = 13300;
   EXPECT_THAT(Summarize(diagnosis), Not(HasSubstr("Repeats scatter")));
 }
 
@@ -53,7 +53,7 @@ TEST(Summarize, CallsNoiseThatIsNotThereSuperfluous) {
 
 TEST(Summarize, WithoutNoiseGivesTheErrorAlone) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kNone);
-  diagnosis.noise_floor->sigma = 0;
+  diagnosis.data[0].noise_floor->sigma = 0;
   EXPECT_EQ(Summarize(diagnosis), "The model is off by 41 ms.");
 }
 
@@ -71,7 +71,7 @@ TEST(Summarize, OfAnAdequateModelClaimsNothing) {
 
 TEST(Summarize, NamesAStepWithItsValueAndWhatIsLeft) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
-  diagnosis.steps = {Step("tip_radius")};
+  diagnosis.steps = {ExampleStep("tip_radius")};
   const std::string summary = Summarize(diagnosis);
   EXPECT_THAT(summary, HasSubstr("Missing: tip_radius (radius_mm 2.98 +- 0.02 mm)."));
   EXPECT_THAT(summary, HasSubstr("Then 5 ms is left."));
@@ -80,7 +80,7 @@ TEST(Summarize, NamesAStepWithItsValueAndWhatIsLeft) {
 
 TEST(Summarize, NamesBothStepsAndWhatWouldTellEquivalentsApart) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
-  diagnosis.steps = {Step("speed_error"), Step("tip_radius")};
+  diagnosis.steps = {ExampleStep("speed_error"), ExampleStep("tip_radius")};
   diagnosis.steps[0].equivalent = {"clock_skew", "contact_slowdown"};
   diagnosis.steps[0].discriminating_measurement = "Touch at two speeds.";
   const std::string summary = Summarize(diagnosis);
@@ -91,14 +91,14 @@ TEST(Summarize, NamesBothStepsAndWhatWouldTellEquivalentsApart) {
 
 TEST(Summarize, CountsValuesThatAreTooManyToWrite) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
-  diagnosis.steps = {Step("object_pose")};
+  diagnosis.steps = {ExampleStep("object_pose")};
   diagnosis.steps[0].parameters.assign(6, RadiusMm());
   EXPECT_THAT(Summarize(diagnosis), HasSubstr("Missing: object_pose (6 values)."));
 }
 
 TEST(Summarize, NamesTheFingerOfAValue) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
-  diagnosis.steps = {Step("finger_length")};
+  diagnosis.steps = {ExampleStep("finger_length")};
   diagnosis.steps[0].parameters[0].entry = "l";
   EXPECT_THAT(Summarize(diagnosis), HasSubstr("radius_mm l 2.98 +- 0.02 mm"));
 }
@@ -114,10 +114,10 @@ TEST(Summarize, SaysWhichValueOfTheModelIsAnother) {
 
 TEST(Summarize, SuggestsAFormulaForWhatNoEffectExplains) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
-  diagnosis.unexplained.emplace();
-  diagnosis.unexplained->covariates = {{"travel_mm", 1e-9, 80}};
-  diagnosis.unexplained->formula = "k * sin(2*pi*travel_mm/lead)";
-  diagnosis.unexplained->rmse = 0.007;
+  diagnosis.data[0].unexplained.emplace();
+  diagnosis.data[0].unexplained->covariates = {{"travel_mm", 1e-9, 80}};
+  diagnosis.data[0].unexplained->formula = "k * sin(2*pi*travel_mm/lead)";
+  diagnosis.data[0].unexplained->rmse = 7000;
   const std::string summary = Summarize(diagnosis);
   EXPECT_THAT(summary, HasSubstr("depends on travel_mm"));
   EXPECT_THAT(summary, HasSubstr("A suggestion: k * sin(2*pi*travel_mm/lead)"));
@@ -127,7 +127,7 @@ TEST(Summarize, SuggestsAFormulaForWhatNoEffectExplains) {
 
 TEST(Summarize, AdmitsThatNotEvenAFormulaFits) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
-  diagnosis.unexplained.emplace();
+  diagnosis.data[0].unexplained.emplace();
   EXPECT_THAT(Summarize(diagnosis),
               HasSubstr("A structure remains that neither an effect of the catalogue nor a simple formula "
                         "explains."));
@@ -136,9 +136,9 @@ TEST(Summarize, AdmitsThatNotEvenAFormulaFits) {
 TEST(Summarize, GivesTheMistakeAndTheCommandThatFixesIt) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kCheckData);
   diagnosis.data_problems = {
-      {"finger_order", "l <-> m", "Fingers l and m are swapped.",
-       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv", 0.041, 0.0051},
-      {"wrong_mesh", "lat20", "lat20 has another shape.", "", 0.041, 0.03}};
+      {engine::ProblemKind::kFingerOrder, "l <-> m", "Fingers l and m are swapped.",
+       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv", 41000, 5100},
+      {engine::ProblemKind::kWrongMesh, "lat20", "lat20 has another shape.", "", 41000, 30000}};
   const std::string summary = Summarize(diagnosis);
   EXPECT_THAT(summary, HasSubstr("Fingers l and m are swapped."));
   EXPECT_THAT(summary, HasSubstr("touchstone session fix set.csv --swap-fingers l,m -o fixed.csv"));
@@ -147,47 +147,66 @@ TEST(Summarize, GivesTheMistakeAndTheCommandThatFixesIt) {
 
 TEST(Summarize, SaysHowManyTouchesAVerdictNeeds) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kTooLittleData);
-  diagnosis.touches_needed = 60;
+  diagnosis.data[0].needed = 60;
   EXPECT_THAT(Summarize(diagnosis), HasSubstr("too little for a verdict; 60 usable touches would do"));
 }
 
 TEST(Summarize, OfNoTouchesSaysNothingOfTheModel) {
   Diagnosis diagnosis;
   diagnosis.verdict = Verdict::kTooLittleData;
+  diagnosis.data.resize(1);
   EXPECT_EQ(Summarize(diagnosis), "No touch could be used: nothing can be said of the model.");
-  EXPECT_THAT(DataWarnings(diagnosis.data), ElementsAre(Summarize(diagnosis)));
+  EXPECT_THAT(DataWarnings(diagnosis.data[0]), ElementsAre(Summarize(diagnosis)));
 }
 
 TEST(DataWarnings, OfAGoodSetAreNone) {
-  EXPECT_THAT(DataWarnings(ExampleDiagnosis(Verdict::kNone).data), IsEmpty());
+  EXPECT_THAT(DataWarnings(ExampleDiagnosis(Verdict::kNone).data[0]), IsEmpty());
 }
 
 TEST(DataWarnings, NameWhatLimitsTheSet) {
-  touches::DataSummary data = ExampleDiagnosis(Verdict::kNone).data;
-  data.touches = 1;
+  DataReport data = ExampleDiagnosis(Verdict::kNone).data[0];
+  data.count = 1;
   data.rows = 10;
   data.objects = {"lat20"};
   data.repeats = 0;
-  data.unused = {{"a finger missed", {9, {}}}};
+  data.set_aside.rows = {{"a finger missed", 9, {}}};
+  data.emulated = 10;
   const std::vector<std::string> warnings = DataWarnings(data);
   EXPECT_THAT(warnings, Contains(StartsWith("Only 1 touch took part")));
+  EXPECT_THAT(warnings, Contains(StartsWith("The touches are emulated (cov_emulated)")));
   EXPECT_THAT(warnings, Contains(StartsWith("One object only")));
   EXPECT_THAT(warnings, Contains(StartsWith("No touch was repeated")));
   EXPECT_THAT(warnings, Contains(StartsWith("9 of 10 rows could not be used")));
 }
 
-TEST(SummarizeJointly, NamesVerdictsThatAgreeWithTheirWords) {
-  JointDiagnosis d;
-  d.touches = ExampleDiagnosis(Verdict::kAdequate);
-  d.photographs.verdict = Verdict::kAdequate;
-  d.photographs.images = 20;
-  EXPECT_THAT(SummarizeJointly(d),
+Diagnosis AdequatePhotographs() {
+  Diagnosis photographs;
+  photographs.verdict = Verdict::kAdequate;
+  photographs.data.resize(1);
+  photographs.data[0].kind = DataKind::kPhotographs;
+  photographs.data[0].count = 20;
+  photographs.data[0].initial = Quality{12.34, 13, 0.3};
+  return photographs;
+}
+
+TEST(Summarize, GivesErrorsOfPhotographsInGreyLevels) {
+  const std::string summary = Summarize(AdequatePhotographs());
+  EXPECT_THAT(summary, StartsWith("The model is off by 12.3 grey levels."));
+  EXPECT_THAT(summary, HasSubstr("Nothing is missing that these pictures could show."));
+}
+
+TEST(Join, NamesVerdictsThatAgreeWithTheirWords) {
+  JointParts parts;
+  parts.touches = ExampleDiagnosis(Verdict::kAdequate);
+  parts.photographs = AdequatePhotographs();
+  EXPECT_THAT(Join(parts).summary,
               AllOf(HasSubstr("Nothing is missing that these data"), HasSubstr("Photographs (ADEQUATE): "),
                     HasSubstr("Nothing is missing that these pictures")));
   joint::SharedStep step;
   step.effect = "object_pose", step.shown_by = "both";
-  d.shared.steps.push_back(step);
-  EXPECT_THAT(SummarizeJointly(d),
+  parts.shared.steps.push_back(step);
+  parts.shared_quality.resize(1);
+  EXPECT_THAT(Join(parts).summary,
               AllOf(HasSubstr("Photographs (ADEQUATE, with object_pose in place): "),
                     HasSubstr("Nothing else is missing that these data"),
                     HasSubstr("Nothing else is missing that these pictures"),

@@ -1,128 +1,107 @@
 #include "server/diagnosis/report/write_report.h"
 
-#include "server/base/units.h"
-#include "server/diagnosis/report/design_messages.h"
-#include "server/diagnosis/report/distributions_messages.h"
 #include "server/diagnosis/report/message_parts.h"
-#include "server/diagnosis/report/residuals_messages.h"
-#include "server/effects/formula.h"
-#include "server/model/finger_name.h"
+#include "server/diagnosis/report/write_data_report.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
-void WriteQuality(const engine::Quality& quality, v1::Quality* message) {
-  message->set_rmse_us(Microseconds(quality.rmse));
-  message->set_heldout_rmse_us(Microseconds(quality.heldout_rmse));
-  message->set_lack_of_fit_p(quality.lack_of_fit_p);
+void WriteVector(const Eigen::Vector3d& vector, v1::Vector3* message) {
+  message->set_x(vector.x());
+  message->set_y(vector.y());
+  message->set_z(vector.z());
 }
 
-void WriteNoiseFloor(const engine::NoiseFloor& floor, v1::NoiseFloor* message) {
-  message->set_sigma_us(Microseconds(floor.sigma));
-  message->set_lower_us(Microseconds(floor.lower));
-  message->set_upper_us(Microseconds(floor.upper));
-  message->set_degrees_of_freedom(static_cast<uint32_t>(floor.degrees_of_freedom));
-  message->set_from_repeats(floor.from_repeats);
+void WriteStep(const Step& step, v1::Step* message) {
+  message->set_effect(step.effect);
+  *message->mutable_equivalent() = {step.equivalent.begin(), step.equivalent.end()};
+  message->set_probability(step.probability);
+  WriteParameters(step.parameters, message->mutable_parameters());
+  message->set_gain_nats(step.gain_nats);
+  message->set_meaning(step.meaning);
+  message->set_check_on_rig(step.check_on_rig);
+  message->set_remedy(step.remedy);
+  message->set_discriminating_measurement(step.discriminating_measurement);
+  *message->mutable_scope() = ScopeMessage(step.scope, step.parameters);
+  message->set_words(step.words);
+  for (const DataKind kind : step.shown_by) message->add_shown_by(ToMessage(kind));
 }
 
-void WriteStep(const engine::LadderStep& step, v1::Step* message) {
-  WriteStepWithoutErrors(step, message);
-  message->set_rmse_us(Microseconds(step.quality.rmse));
-  message->set_heldout_rmse_us(Microseconds(step.quality.heldout_rmse));
+v1::DataProblem::Kind KindMessage(engine::ProblemKind kind) {
+  static_assert(static_cast<int>(engine::ProblemKind::kFocalFactor) + 1 == v1::DataProblem::FOCAL_FACTOR);
+  return static_cast<v1::DataProblem::Kind>(static_cast<int>(kind) + 1);
 }
 
-void WriteCandidate(const engine::RankedCandidate& candidate, v1::Candidate* message) {
-  WriteCandidateWithoutErrors(candidate, message);
-  message->set_rmse_us(Microseconds(candidate.rmse));
-  message->set_heldout_rmse_us(Microseconds(candidate.heldout_rmse));
+void WriteDataProblem(const DataProblem& problem, v1::DataProblem* message) {
+  message->set_kind(KindMessage(problem.kind));
+  message->set_detail(problem.detail);
+  message->set_words(problem.words);
+  message->set_fix(problem.fix);
+  message->set_error_before(problem.error_before);
+  message->set_error_after(problem.error_after);
+  message->set_data_index(static_cast<uint32_t>(problem.data_index));
 }
 
-void WriteCurve(const model::LookupSpec& lookup, v1::UnexplainedCurve* message) {
-  message->set_covariate(lookup.covariate);
-  for (const effects::FormulaVariable& variable : effects::FormulaVariables())
-    if (lookup.covariate == variable.name) message->set_covariate_unit(variable.unit);
-  message->set_unit(lookup.adds_time ? "us" : "mm");
-  *message->mutable_knots() = {lookup.knots.begin(), lookup.knots.end()};
-  const int lists = static_cast<int>(lookup.values.size());
-  for (int i = 0; i < lists; ++i) {
-    v1::FingerCurve* curve = message->add_curves();
-    if (lists > 1) curve->set_finger(model::FingerName(i, lists));
-    *curve->mutable_values() = {lookup.values[i].begin(), lookup.values[i].end()};
-  }
+void WriteNext(const design::ProposedTouch& proposed, v1::NextMeasurement* message) {
+  message->set_object(proposed.object);
+  message->set_purpose(proposed.purpose);
+  message->set_separation(proposed.separation_sigmas);
+  message->set_count_to_verdict(static_cast<uint32_t>(proposed.touches_to_verdict));
+  v1::CommandedTouch* touch = message->mutable_touch();
+  WriteVector(proposed.touch.target_m, touch->mutable_target_m());
+  WriteVector(proposed.touch.approach, touch->mutable_approach());
+  WriteVector(proposed.touch.lateral, touch->mutable_lateral());
+  touch->set_standoff_m(proposed.touch.standoff_m);
+  touch->set_speed_m_s(proposed.touch.speed_m_s);
+  if (proposed.has_session_time) touch->set_session_time_s(proposed.touch.session_time_s);
+  for (const auto& [name, value] : proposed.touch.covariates) (*touch->mutable_covariates())[name] = value;
 }
 
-void WriteUnexplained(const engine::UnexplainedRest& rest, v1::Unexplained* message) {
-  WriteRestWithoutErrors(rest, message);
-  WriteParameters(rest.parameters, message);
-  message->set_rmse_us(Microseconds(rest.rmse));
-  message->set_heldout_rmse_us(Microseconds(rest.heldout_rmse));
-  message->set_nearest_effect(rest.nearest_effect);
-  message->set_nearest_cosine(rest.nearest_cosine);
-  message->set_nearest_formula(rest.nearest_formula);
-  message->set_nearest_formula_share(rest.nearest_formula_share);
-  if (rest.lookup != nullptr) WriteCurve(*rest.lookup->lookup, message->mutable_curve());
-}
-
-void WriteDataProblem(const engine::DataProblem& problem, v1::DataProblem* message) {
-  WriteProblemWithoutErrors(problem, message);
-  message->set_rmse_before_us(Microseconds(problem.error_before));
-  message->set_rmse_after_us(Microseconds(problem.error_after));
-}
-
-void WriteData(const touches::DataSummary& data, v1::Report* report) {
-  report->set_touches(static_cast<uint32_t>(data.touches));
-  for (int finger = 0; finger < data.fingers; ++finger)
-    report->add_fingers(model::FingerName(finger, data.fingers));
-  v1::DataSummary* message = report->mutable_data();
-  message->set_origin(data.origin);
-  message->set_rows(static_cast<uint32_t>(data.rows));
-  for (const auto& [reason, unused] : data.unused) {
-    v1::UnusedRows* rows = message->add_unused();
-    rows->set_reason(reason);
-    rows->set_rows(static_cast<uint32_t>(unused.count));
-    for (const uint64_t touch : unused.examples) rows->add_examples(touch);
-  }
-  message->set_outliers(static_cast<uint32_t>(data.outliers));
-  for (const std::string& object : data.objects) message->add_objects(object);
-  message->set_poses(static_cast<uint32_t>(data.poses));
-  message->set_repeats(static_cast<uint32_t>(data.repeats));
-  message->set_rounds(static_cast<uint32_t>(data.rounds));
-  for (const double speed_mm_s : data.speeds_mm_s) message->add_speeds_mm_s(speed_mm_s);
-  message->set_missed_contacts(static_cast<uint32_t>(data.missed_contacts));
+void WriteNext(const images::ProposedPhotograph& proposed, v1::NextMeasurement* message) {
+  message->set_object(proposed.object);
+  message->set_purpose(proposed.purpose);
+  message->set_separation(proposed.separation);
+  message->set_count_to_verdict(static_cast<uint32_t>(proposed.photographs_to_verdict));
+  v1::CameraPose* camera = message->mutable_photograph();
+  WriteVector(proposed.camera.eye_m, camera->mutable_eye_m());
+  WriteVector(proposed.camera.at_m, camera->mutable_at_m());
+  WriteVector(proposed.camera.up, camera->mutable_up());
 }
 
 void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
-  WriteModelChanges(diagnosis, report);
-  for (const engine::LadderStep& step : diagnosis.steps) WriteStep(step, report->add_steps());
-  for (const engine::RankedCandidate& candidate : diagnosis.candidates)
-    WriteCandidate(candidate, report->add_candidates());
-  if (diagnosis.unexplained) WriteUnexplained(*diagnosis.unexplained, report->mutable_unexplained());
+  for (const DataProblem& problem : diagnosis.data_problems)
+    WriteDataProblem(problem, report->add_data_problems());
+  *report->mutable_superfluous() = {diagnosis.superfluous.begin(), diagnosis.superfluous.end()};
+  for (const engine::RefittedEffect& refit : diagnosis.refitted) {
+    v1::Refit* message = report->add_refitted();
+    message->set_effect(refit.effect);
+    WriteParameters(refit.parameters, message->mutable_parameters());
+  }
+  for (const Step& step : diagnosis.steps) WriteStep(step, report->add_steps());
+  for (const engine::ConfoundedEffects& confounded : diagnosis.confounded) {
+    v1::Ambiguity* message = report->add_ambiguities();
+    *message->mutable_effects() = {confounded.effects.begin(), confounded.effects.end()};
+    message->set_discriminating_measurement(confounded.discriminating_measurement);
+  }
 }
 
 }  // namespace
 
 v1::Report ToReport(const Diagnosis& diagnosis) {
-  if (diagnosis.pose_free) return PoseFreeReport(diagnosis.pose_free->input, diagnosis.pose_free->comparison);
   v1::Report report;
   report.set_verdict(ToMessage(diagnosis.verdict));
+  report.set_summary(diagnosis.summary);
+  *report.mutable_warnings() = {diagnosis.warnings.begin(), diagnosis.warnings.end()};
   report.set_model_name(diagnosis.model_name);
   report.set_model_hash(diagnosis.model_hash);
-  WriteData(diagnosis.data, &report);
-  if (diagnosis.noise_floor) {
-    WriteNoiseFloor(*diagnosis.noise_floor, report.mutable_noise_floor());
-    report.set_noise_floor_us(report.noise_floor().sigma_us());
-  }
-  if (diagnosis.initial) WriteQuality(*diagnosis.initial, report.mutable_initial());
-  if (diagnosis.final) WriteQuality(*diagnosis.final, report.mutable_final());
-  report.set_reducible_share(diagnosis.reducible_share);
-  WriteResiduals(diagnosis.residuals, diagnosis.data.fingers, &report);
   WriteCauses(diagnosis, &report);
-  for (const engine::DataProblem& problem : diagnosis.data_problems)
-    WriteDataProblem(problem, report.add_data_problems());
-  report.set_touches_needed(static_cast<uint32_t>(diagnosis.touches_needed));
-  for (const design::ProposedTouch& touch : diagnosis.next_touches) WriteProposedTouch(touch, &report);
-  report.set_summary(diagnosis.summary);
-  for (const std::string& warning : diagnosis.warnings) report.add_warnings(warning);
+  for (const DataReport& data : diagnosis.data) *report.add_data() = ToMessage(data);
+  if (diagnosis.improved_model) {
+    report.set_improved_model_yaml(model::FormatModel(*diagnosis.improved_model));
+    report.set_improved_model_hash(diagnosis.improved_model->Hash());
+  }
+  for (const NextMeasurement& next : diagnosis.next)
+    std::visit([&report](const auto& proposed) { WriteNext(proposed, report.add_next()); }, next);
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }

@@ -1,4 +1,4 @@
-// The wire message of a diagnosis: the same values in its units (us, mm).
+// The wire message of a diagnosis: the same values.
 #pragma once
 
 #include "server/diagnosis/report/diagnosis.h"
@@ -6,6 +6,7 @@
 
 namespace touchstone::diagnosis::report {
 
+// All but what the program adds that was asked: version and provenance.
 v1::Report ToReport(const Diagnosis& diagnosis);
 
 }  // namespace touchstone::diagnosis::report

@@ -109,6 +109,7 @@ absl::Status Rig::EnsureSession(const std::string& name) {
   session.name = name;
   session.created_unix_s = timing::UnixNowS();
   session.provenance = Provenance();
+  session.emulated = options_.emulated;
   session.calibration = calibration::FormatCalibration(parts_.planner->calibration());
   session.fingers = options_.fingers;
   session.spacing_m = options_.spacing_m;

@@ -44,7 +44,8 @@ struct RigOptions {
   // are replaced. Empty: a person changes it and calls Mount.
   std::vector<std::string> mount_command;
   double mount_timeout_s = 120;
-  std::string provenance_note;  // who made the data; an emulator says here that it is one
+  std::string provenance_note;  // who made the data
+  bool emulated = false;        // an emulator is in the rig's place: every session says so
   std::string effector_port;
   CameraPoseTolerance camera_tolerance;       // of photographs
   const Clock* clock = &timing::HostClock();  // outlives the rig

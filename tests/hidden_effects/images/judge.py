@@ -89,6 +89,11 @@ def _cover(step, values, mark):
         mark.errors.append((value - truth) / error)
 
 
+def of_photographs(report):
+    """The report's entry of photographs; {} without one."""
+    return next((data for data in report.get("data", []) if data["kind"] == "PHOTOGRAPHS"), {})
+
+
 def judge(report, truth, seconds):
     """truth: as sets.Truth, a dict. report: None if there is none."""
     mark = Mark(seconds=seconds)
@@ -99,16 +104,17 @@ def judge(report, truth, seconds):
     mark.claims = [s["effect"] for s in steps]
     mark.probability = _number(steps[0].get("probability")) if steps else 0.0
     hidden = truth["effects"]
-    floor = _number(report.get("noise_floor_grey"))
-    if floor > 0 and report.get("final"):
-        mark.over_floor = _number(report["final"].get("rmse_grey")) / floor
+    data = of_photographs(report)
+    floor = _number(data.get("noise_floor"))
+    if floor > 0 and data.get("final"):
+        mark.over_floor = _number(data["final"].get("rmse")) / floor
 
     true_step = lambda s: any(_is(s, e) for e in hidden)
     wrong_steps = [s for s in steps if not true_step(s)]
     # A step that holds the truth among its equivalents blames nothing.
     blames = [s for s in wrong_steps
               if _number(s.get("probability")) > CONFIDENT and not set(s.get("equivalent", [])) & set(hidden)]
-    mistakes = [p["kind"] for p in report.get("data_problems", [])]
+    mistakes = [p["kind"].lower() for p in report.get("data_problems", [])]
     mark.right_first = bool(steps) and true_step(steps[0])
     mark.all_found = (all(any(_is(s, e) for s in steps) for e in hidden) and not wrong_steps
                       and mark.verdict == "MISSING_EFFECTS") if hidden else not steps

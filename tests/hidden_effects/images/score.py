@@ -46,7 +46,7 @@ def diagnose(program, folder, model, meshes, out):
 def falls_as_said(program, folder, report, meshes, out):
     """Whether `compare` with the improved model finds the error that the report says, within 5 %."""
     better = pathlib.Path(out).with_suffix(".better.yaml")
-    final = float(report.get("final", {}).get("rmse_grey") or "nan")
+    final = float(judge.of_photographs(report).get("final", {}).get("rmse") or "nan")
     if not report.get("steps") or not better.exists():
         return True
     found = pathlib.Path(out).with_suffix(".compared.json")
@@ -54,7 +54,7 @@ def falls_as_said(program, folder, report, meshes, out):
                     str(found)], capture_output=True, timeout=LIMIT_S, check=False)
     if not found.exists():
         return False
-    rmse = float(json.loads(found.read_text()).get("initial", {}).get("rmse_grey", math.inf))
+    rmse = float(judge.of_photographs(json.loads(found.read_text())).get("initial", {}).get("rmse", math.inf))
     return abs(rmse / final - 1) <= 0.05
 
 

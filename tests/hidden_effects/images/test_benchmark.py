@@ -129,7 +129,7 @@ def test_unlisted_causes_must_be_left_nameless_and_mistakes_named():
     assert judge.judge({"verdict": "ADEQUATE"}, dirt, 1).confidently_wrong
     assert judge.judge({"verdict": "MISSING_EFFECTS", "steps": [a_step("vignetting")]}, dirt, 1).confidently_wrong
     mirrored = a_truth(blunder="mirrored")
-    named = lambda kind: {"verdict": "CHECK_DATA", "data_problems": [{"kind": kind}]}
+    named = lambda kind: {"verdict": "CHECK_DATA", "data_problems": [{"kind": kind.upper()}]}
     assert judge.judge(named("mirrored"), mirrored, 1).right
     assert judge.judge(named("wrong_object"), mirrored, 1).confidently_wrong
 

@@ -51,24 +51,26 @@ def effects(report):
 @trial
 def test_objects_that_lie_askew_are_found_by_both_and_tighter_than_by_either(tmp_path):
     report = diagnosed(tmp_path, POSE, POSE)
-    assert effects(report) == [("object_pose", "both")], report["summary"]
+    assert effects(report) == [("object_pose", ["TOUCHES", "PHOTOGRAPHS"])], report["summary"]
     truth = [*POSE["translation_mm"], *POSE["rotation_deg"]]
     for value, true in zip(report["steps"][0]["parameters"], truth):
         assert abs(value["value"] - true) < 4 * value["std_error"], value
-        assert value["std_error"] < min(value["std_error_touches"], value["std_error_photographs"]), value
+        assert len(value["alone"]) == 2 and value["std_error"] < min(each["std_error"] for each in value["alone"]), value
     found = run(tmp_path, "compare", "better.yaml", "compared.json")
-    for error in ("rmse_us", "rmse_grey"):
-        assert report["final"][error] == pytest.approx(found["initial"][error], rel=1e-3)
-    assert report["final"]["rmse_us"] < 1.1 * joint.SIGMA_US
+    assert [(data["kind"], data["unit"]) for data in report["data"]] == [("TOUCHES", "us"), ("PHOTOGRAPHS", "grey")]
+    for promised, compared in zip(report["data"], found["data"]):
+        assert promised["final"]["rmse"] == pytest.approx(compared["initial"]["rmse"], rel=1e-3)
+    assert report["data"][0]["final"]["rmse"] < 1.1 * joint.SIGMA_US
 
 
 def test_a_tool_is_not_told_as_the_pose_of_objects(tmp_path):
     report = diagnosed(tmp_path, yaw_deg=1.0)
-    assert effects(report) == [("tool_yaw", "touches")], report["summary"]
+    assert effects(report) == [("tool_yaw", ["TOUCHES"])], report["summary"]
 
 
 @trial
 def test_objects_moved_between_touching_and_photographing_are_a_contradiction(tmp_path):
     report = diagnosed(tmp_path, {"translation_mm": (0.5, 0, 0)}, {"translation_mm": (0, 0.5, 0)})
     assert report["verdict"] == "UNEXPLAINED" and not report["steps"], report["summary"]
-    assert "contradict" in report["unexplained"]["words"]
+    for data in report["data"]:
+        assert "contradict" in data["unexplained"]["words"]

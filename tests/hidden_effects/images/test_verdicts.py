@@ -40,7 +40,8 @@ def marked(folder, effects=None, blunder="", seed=SEED):
 def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path):
     report, mark, _ = marked(tmp_path)
     assert not mark.false_claim, (mark.verdict, mark.claims)
-    assert report["final"]["rmse_grey"] == pytest.approx(report["initial"]["rmse_grey"], rel=0.01)
+    data = judge.of_photographs(report)
+    assert data["final"]["rmse"] == pytest.approx(data["initial"]["rmse"], rel=0.01)
 
 
 trial = pytest.mark.second_tier("statistical: trials of hidden effects in photographs")
@@ -50,7 +51,8 @@ trial = pytest.mark.second_tier("statistical: trials of hidden effects in photog
 def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect, tmp_path):
     report, mark, _ = marked(tmp_path, [effect])
     assert mark.right_first and not mark.confidently_wrong, (mark.verdict, mark.claims)
-    assert mark.over_floor < judge.OVER_FLOOR < report["initial"]["rmse_grey"] / report["noise_floor_grey"]
+    data = judge.of_photographs(report)
+    assert mark.over_floor < judge.OVER_FLOOR < data["initial"]["rmse"] / data["noise_floor"]
     assert all(abs(error) < 4 for error in mark.errors) and mark.errors
 
 

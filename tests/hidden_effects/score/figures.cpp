@@ -53,7 +53,7 @@ bool SaysWhere(const v1::Step& step, const Strings& words) {
 }
 
 bool IsUnexplainedBy(const v1::Report& report, const Strings& covariates) {
-  const auto& found = report.unexplained().covariates();
+  const auto& found = TouchEntry(report).unexplained().covariates();
   return report.verdict() == v1::Report::UNEXPLAINED && !found.empty() &&
          BeginsWithAny(found[0].name(), covariates);
 }
@@ -68,7 +68,7 @@ bool CauseIsRight(const Scenario& truth, const v1::Report& report, const Answer&
   const Cause& cause = truth.causes.front();
   // No covariate tells poses apart, so none may be named.
   if (cause.kind == CauseKind::kPoseError && report.verdict() == v1::Report::UNEXPLAINED &&
-      report.unexplained().covariates().empty())
+      TouchEntry(report).unexplained().covariates().empty())
     return OnlyTrueSteps(report, answer);
   Strings where;
   switch (cause.kind) {
@@ -163,7 +163,7 @@ bool IsRight(const Arm& arm, const Scenario& truth, const v1::Report& report, co
       return WrongNoiseIsRight(truth, report);
     case Kind::kBlunder:
       return report.verdict() == v1::Report::CHECK_DATA && report.data_problems_size() > 0 &&
-             IsIn(answer.problems, report.data_problems(0).kind());
+             IsIn(answer.problems, KindOf(report.data_problems(0)));
     case Kind::kTooFew:
       return report.verdict() == v1::Report::TOO_LITTLE_DATA;
   }
@@ -185,7 +185,7 @@ bool IsConfidentlyWrong(const Arm& arm, const Scenario& truth, const v1::Report&
     if (step.probability() > kConfident && !HoldsTruth(step, answer)) return true;
   const auto verdict = report.verdict();
   if (verdict == v1::Report::CHECK_DATA &&
-      (report.data_problems_size() == 0 || !IsIn(answer.problems, report.data_problems(0).kind())))
+      (report.data_problems_size() == 0 || !IsIn(answer.problems, KindOf(report.data_problems(0)))))
     return true;
   if (FallIsNotFound(report, final_found_us)) return true;
   if (right) return false;
@@ -221,11 +221,13 @@ bool IsACurve(const Arm& arm, const Scenario& truth) {
 }
 
 bool ClaimsAFall(const v1::Report& report) {
-  return report.has_final() && report.final().rmse_us() < kFall * report.initial().rmse_us();
+  return TouchEntry(report).has_final() &&
+         TouchEntry(report).final().rmse() < kFall * TouchEntry(report).initial().rmse();
 }
 
 bool FallIsNotFound(const v1::Report& report, double final_found_us) {
-  return ClaimsAFall(report) && !(std::abs(final_found_us / report.final().rmse_us() - 1) <= kFoundWithin);
+  return ClaimsAFall(report) &&
+         !(std::abs(final_found_us / TouchEntry(report).final().rmse() - 1) <= kFoundWithin);
 }
 
 std::vector<Mark> JudgeFigures(const Arm& arm, const Scenario& truth, const v1::Report& report,

@@ -13,8 +13,9 @@ namespace {
 v1::Report Says(v1::Report::Verdict verdict, double initial_us = 12'000, double final_us = 12'000) {
   v1::Report report;
   report.set_verdict(verdict);
-  report.mutable_initial()->set_rmse_us(initial_us);
-  report.mutable_final()->set_rmse_us(final_us);
+  v1::DataReport* data = report.add_data();
+  data->mutable_initial()->set_rmse(initial_us);
+  data->mutable_final()->set_rmse(final_us);
   return report;
 }
 
@@ -29,7 +30,7 @@ v1::Step* NameStep(v1::Report* report, const std::string& effect, double probabi
 
 v1::Report UnexplainedBy(const std::string& covariate) {
   v1::Report report = Says(v1::Report::UNEXPLAINED);
-  report.mutable_unexplained()->add_covariates()->set_name(covariate);
+  report.mutable_data(0)->mutable_unexplained()->add_covariates()->set_name(covariate);
   return report;
 }
 
@@ -155,9 +156,9 @@ TEST(Figures, AMistakeInTheFileIsRightByItsKind) {
   Scenario truth;
   truth.blunders = {{BlunderKind::kFingersPermuted, 0, {1, 0, 2}}};
   v1::Report report = Says(v1::Report::CHECK_DATA);
-  report.add_data_problems()->set_kind("finger_order");
+  report.add_data_problems()->set_kind(v1::DataProblem::FINGER_ORDER);
   EXPECT_EQ(Letters("fingers permuted, strong", truth, report), "RH");
-  report.mutable_data_problems(0)->set_kind("row_shift");
+  report.mutable_data_problems(0)->set_kind(v1::DataProblem::ROW_SHIFT);
   EXPECT_EQ(Letters("fingers permuted, strong", truth, report), "W");
   v1::Report physics = Says(v1::Report::MISSING_EFFECTS);
   NameStep(&physics, "tool_yaw", 0.99);
@@ -210,7 +211,7 @@ TEST(Figures, ABadPrintIsNamedOrOwnedUpWithoutAFallThatNobodyGetsAgain) {
   NameStep(&report, "surface_map", 0.95);
   EXPECT_EQ(Letters(arm, truth, report), "RH");
   EXPECT_EQ(Letters(arm, truth, Says(v1::Report::UNEXPLAINED)), "RH");
-  report.mutable_final()->set_rmse_us(5000);
+  report.mutable_data(0)->mutable_final()->set_rmse(5000);
   EXPECT_EQ(Letters(arm, truth, report, {12'000, NAN, NAN}), "W");
 }
 

@@ -1,6 +1,7 @@
 #include "tests/hidden_effects/score/judge.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 
@@ -112,7 +113,8 @@ void JudgeEffects(const Arm& arm, const Scenario& truth, const v1::Report& repor
   marks->push_back({"none added", !added});
   marks->push_back({"says missing effects", report.verdict() == v1::Report::MISSING_EFFECTS});
   if (all_quiet)
-    marks->push_back({"rmse at the floor", report.final().rmse_us() <= 1.05 * report.noise_floor_us()});
+    marks->push_back(
+        {"rmse at the floor", TouchEntry(report).final().rmse() <= 1.05 * TouchEntry(report).noise_floor()});
 }
 
 void JudgeAmbiguity(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
@@ -140,7 +142,7 @@ void JudgeUnlisted(const Scenario& truth, const v1::Report& report, double formu
   marks->push_back({"unexplained", owned_up});
   marks->push_back({"wrong name instead", !owned_up && report.steps_size() > 0});
   const auto& right = FindUnlisted(truth.unlisted.front().name).covariates;
-  const auto& covariates = report.unexplained().covariates();
+  const auto& covariates = TouchEntry(report).unexplained().covariates();
   marks->push_back({"right covariate first", covariates.size() > 0 && Contains(right, covariates[0].name())});
   marks->push_back({"formula halves the misfit", formula_cuts_to <= 0.5});
 }
@@ -161,16 +163,27 @@ std::string Number(double value) {
 
 // The distribution differs, or repeats show something; then the truth must be among what would do it.
 void JudgeNoPoses(const Scenario& truth, const v1::Report& report, std::vector<Mark>* marks) {
-  const bool found = report.distributions().p() < 0.01 || report.distributions().findings_size() > 0;
+  const v1::DistributionComparison& distributions = TouchEntry(report).distributions();
+  const bool found = distributions.p() < 0.01 || distributions.findings_size() > 0;
   marks->push_back({truth.hidden.empty() ? "false detection" : "detects", found});
-  if (truth.hidden.empty() || report.distributions().findings().empty()) return;
+  if (truth.hidden.empty() || distributions.findings().empty()) return;
   bool named = false;
-  for (const v1::RepeatFinding& finding : report.distributions().findings())
+  for (const v1::RepeatFinding& finding : distributions.findings())
     for (const std::string& effect : finding.compatible_effects()) named |= effect == truth.hidden[0].effect;
   marks->push_back({"truth among what repeats allow", named});
 }
 
 }  // namespace
+
+const v1::DataReport& TouchEntry(const v1::Report& report) {
+  return report.data().empty() ? v1::DataReport::default_instance() : report.data(0);
+}
+
+std::string KindOf(const v1::DataProblem& problem) {
+  std::string name = v1::DataProblem::Kind_Name(problem.kind());
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name;
+}
 
 std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report& report,
                         double formula_cuts_to) {
@@ -215,8 +228,9 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
           sized |= std::abs(parameter.value() / truth.sigma_us - 1) < 0.05;
       marks.push_back({"noise named", named});
       marks.push_back({"noise within 5 %", sized});
-      bool agree = report.histograms_size() > 0;
-      for (const v1::Histogram& histogram : report.histograms()) agree &= histogram.p_improved() > 0.001;
+      bool agree = TouchEntry(report).histograms_size() > 0;
+      for (const v1::Histogram& histogram : TouchEntry(report).histograms())
+        agree &= histogram.p_improved() > 0.001;
       marks.push_back({"histograms agree", agree});
       break;
     }
@@ -285,21 +299,22 @@ std::string ReportInWords(const v1::Report& report) {
     words += "; refitted " + refit.effect();
     add_values(refit.parameters());
   }
-  if (report.has_unexplained()) {
+  if (const v1::DataReport& data = TouchEntry(report); data.has_unexplained()) {
     words += "; unexplained:";
-    for (const v1::CovariateTest& test : report.unexplained().covariates()) {
+    for (const v1::CovariateTest& test : data.unexplained().covariates()) {
       words += " " + test.name();
-      if (&test == &report.unexplained().covariates(std::min(2, report.unexplained().covariates_size() - 1)))
+      if (&test == &data.unexplained().covariates(std::min(2, data.unexplained().covariates_size() - 1)))
         break;
     }
-    words += " formula '" + report.unexplained().formula() + "'";
-    if (!report.unexplained().lookup_yaml().empty()) words += " with a lookup";
+    words += " formula '" + data.unexplained().formula() + "'";
+    if (!data.unexplained().lookup_yaml().empty()) words += " with a lookup";
   }
   for (const v1::DataProblem& problem : report.data_problems())
-    words += "; check data: " + problem.kind() + " " + problem.detail();
+    words += "; check data: " + KindOf(problem) + " " + problem.detail();
   for (const std::string& effect : report.superfluous()) words += "; superfluous " + effect;
-  words += "; rmse " + Number(report.initial().rmse_us()) + " -> " + Number(report.final().rmse_us()) +
-           " floor " + Number(report.noise_floor_us()) + " us, p " + Number(report.final().lack_of_fit_p());
+  const v1::DataReport& data = TouchEntry(report);
+  words += "; rmse " + Number(data.initial().rmse()) + " -> " + Number(data.final().rmse()) + " floor " +
+           Number(data.noise_floor()) + " us, p " + Number(data.final().lack_of_fit_p());
   return words;
 }
 

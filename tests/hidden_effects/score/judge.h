@@ -16,6 +16,11 @@ struct Mark {
   bool yes = false;
 };
 
+// What the report says of the touches; empty where it says nothing.
+const v1::DataReport& TouchEntry(const v1::Report& report);
+// "finger_order".
+std::string KindOf(const v1::DataProblem& problem);
+
 // Marks of the diagnosis of one set. `formula_cuts_to`: what the suggested formula leaves of the mean square
 // misfit on fresh touches, as a share; NaN without a formula.
 std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report& report,

@@ -120,7 +120,7 @@ TEST(Judge, UnlistedPhysicsMustBeOwnedUp) {
   truth.unlisted = {{"lead_screw", 0.2, 4}};
   v1::Report report;
   report.set_verdict(v1::Report::UNEXPLAINED);
-  report.mutable_unexplained()->add_covariates()->set_name("travel_mm");
+  report.add_data()->mutable_unexplained()->add_covariates()->set_name("travel_mm");
   auto marks = Judge(arm, truth, report, 0.3);
   EXPECT_EQ(Ask("unexplained", marks), true);
   EXPECT_EQ(Ask("right covariate first", marks), true);
@@ -135,7 +135,7 @@ TEST(Judge, UnlistedPhysicsMustBeOwnedUp) {
 
 TEST(Judge, WithoutPosesTheDifferenceIsFoundAndNobodyIsBlamed) {
   v1::Report report;
-  report.mutable_distributions()->set_p(0.001);
+  report.add_data()->mutable_distributions()->set_p(0.001);
   const auto marks = Judge(*FindArm("no poses"), Hiding({{"tip_radius", {2}}}), report, NAN);
   EXPECT_EQ(Ask("detects", marks), true);
   EXPECT_EQ(Ask("names a culprit", marks), false);

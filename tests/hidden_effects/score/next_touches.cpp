@@ -31,7 +31,8 @@ absl::StatusOr<std::vector<Command>> Proposed(const diagnosis::DiagnosisInput& i
   TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis diagnosis,
                               diagnosis::Propose(input, kAddedAtOnce, {}));
   std::vector<Command> commands;
-  for (const diagnosis::design::ProposedTouch& proposed : diagnosis.next_touches) {
+  for (const diagnosis::report::NextMeasurement& next : diagnosis.next) {
+    const auto& proposed = std::get<diagnosis::design::ProposedTouch>(next);
     const touch::CommandedTouch& touch = proposed.touch;
     Command command;
     while (command.object < static_cast<int>(scenario.objects.size()) &&

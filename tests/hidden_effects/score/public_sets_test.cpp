@@ -57,7 +57,7 @@ TEST_F(PublicSets, NothingHiddenIsAdequate) {
   const v1::Report report = Diagnosed("nothing_hidden.csv");
   EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE) << ReportInWords(report);
   EXPECT_EQ(report.touches(), 960u);
-  EXPECT_NEAR(report.noise_floor_us(), 5000, 400);
+  EXPECT_NEAR(TouchEntry(report).noise_floor(), 5000, 400);
 }
 
 TEST_F(PublicSets, TipRadiusIsNamedAndMeasured) {
@@ -67,7 +67,7 @@ TEST_F(PublicSets, TipRadiusIsNamedAndMeasured) {
   EXPECT_EQ(report.steps(0).effect(), "tip_radius");
   EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
   EXPECT_NEAR(Value(report.steps(0)), 1.5, 0.15);
-  EXPECT_LE(report.final().rmse_us(), 1.05 * report.noise_floor_us());
+  EXPECT_LE(TouchEntry(report).final().rmse(), 1.05 * TouchEntry(report).noise_floor());
 }
 
 TEST_F(PublicSets, ObjectPushIsNamedAndMeasured) {
@@ -76,7 +76,7 @@ TEST_F(PublicSets, ObjectPushIsNamedAndMeasured) {
   ASSERT_EQ(report.steps_size(), 1) << ReportInWords(report);
   EXPECT_EQ(report.steps(0).effect(), "object_push");
   EXPECT_NEAR(Value(report.steps(0)), 0.3, 0.03);
-  EXPECT_LE(report.final().rmse_us(), 1.05 * report.noise_floor_us());
+  EXPECT_LE(TouchEntry(report).final().rmse(), 1.05 * TouchEntry(report).noise_floor());
 }
 
 TEST_F(PublicSets, TwoEffectsAreBothNamed) {
@@ -102,9 +102,9 @@ TEST_F(PublicSets, WhatNoCatalogueListsIsUnexplainedAndHangsOnTheApproach) {
   SKIP_WITHOUT("unlisted.csv");
   const v1::Report report = Diagnosed("unlisted.csv");
   EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED) << ReportInWords(report);
-  ASSERT_GT(report.unexplained().covariates_size(), 0);
-  EXPECT_EQ(report.unexplained().covariates(0).name(), "approach_z") << ReportInWords(report);
-  EXPECT_GT(report.unexplained().heldout_gain(), 0.5);
+  ASSERT_GT(TouchEntry(report).unexplained().covariates_size(), 0);
+  EXPECT_EQ(TouchEntry(report).unexplained().covariates(0).name(), "approach_z") << ReportInWords(report);
+  EXPECT_GT(TouchEntry(report).unexplained().heldout_gain(), 0.5);
 }
 
 TEST_F(PublicSets, ABadPrintIsNoPhysics) {
@@ -119,7 +119,7 @@ TEST_F(PublicSets, WithoutPosesNobodyIsBlamed) {
   SKIP_WITHOUT("without_poses.csv");
   const v1::Report report = Diagnosed("without_poses.csv");
   EXPECT_EQ(report.steps_size(), 0) << ReportInWords(report);
-  EXPECT_TRUE(report.has_distributions());
+  EXPECT_TRUE(TouchEntry(report).has_distributions());
 }
 
 }  // namespace

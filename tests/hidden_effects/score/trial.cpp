@@ -55,7 +55,7 @@ void Count(const Arm& arm, const std::vector<Mark>& marks, Rates* rates) {
 void JudgeOutcome(const TestObjects& objects, Outcome* out) {
   const Arm& arm = *out->arm;
   const Scenario& truth = out->set.truth;
-  const v1::Unexplained& unexplained = out->report.unexplained();
+  const v1::Unexplained& unexplained = TouchEntry(out->report).unexplained();
   Tried tried;
   if (arm.kind == Kind::kUnlisted)
     tried.formula_cuts_to = CutsTo(truth, out->seed, unexplained.formula_yaml(), objects);

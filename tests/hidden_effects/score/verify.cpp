@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "server/base/status.h"
-#include "server/base/units.h"
 
 namespace touchstone::hidden {
 
@@ -17,8 +16,8 @@ absl::StatusOr<double> FinalRmseFoundAgainUs(const Set& set, const v1::Report& r
   TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                               InputFor(set.csv, saved.empty() ? set.model_yaml : saved, objects));
   TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::report::Diagnosis compared, diagnosis::Compare(input, {}));
-  if (!compared.final) return absl::NotFoundError("no touch could be compared");
-  return compared.final->rmse * kMicrosecondsPerSecond;
+  if (!compared.data[0].final) return absl::NotFoundError("no touch could be compared");
+  return compared.data[0].final->rmse;
 }
 
 std::string WithEffect(const std::string& model_yaml, const std::string& effect_yaml) {
@@ -54,7 +53,7 @@ std::optional<Scenario> FittedCopy(const Scenario& truth, const v1::Report& repo
     return std::nullopt;
   if (step.parameters_size() != static_cast<int>(hidden.values.size())) return std::nullopt;
   Scenario copy = truth;
-  copy.sigma_us = report.noise_floor_us();
+  copy.sigma_us = TouchEntry(report).noise_floor();
   // What the model claims stays as it was.
   if (copy.model_sigma_us == 0) copy.model_sigma_us = truth.sigma_us;
   for (size_t i = 0; i < hidden.values.size(); ++i)

@@ -15,7 +15,7 @@ Scenario WithPush() {
 
 v1::Report ReportOf(const char* effect, double value) {
   v1::Report report;
-  report.set_noise_floor_us(4900);
+  report.add_data()->set_noise_floor(4900);
   v1::Step* step = report.add_steps();
   step->set_effect(effect);
   step->add_parameters()->set_value(value);

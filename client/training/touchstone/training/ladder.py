@@ -86,7 +86,7 @@ def models(report: touchstone.Report) -> list[tuple[str, str]]:
     for step in report.steps:
         kept += [block for block in blocks if _effect(block) == step.effect]
         found.append((f"+ {step.effect}", head + "".join(kept)))
-    rest = report.message.unexplained.lookup_yaml
+    rest = report.data[0].message.unexplained.lookup_yaml
     if rest:
         found.append(("+ lookup", head + "".join(kept) + rest.rstrip("\n") + "\n"))
     return found

@@ -1,8 +1,9 @@
-#include "server/diagnosis/report/distributions_messages.h"
+#include "server/diagnosis/report/from_distributions.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
@@ -47,56 +48,66 @@ distributions::PoseFreeComparison Adequate() {
   return comparison;
 }
 
-TEST(PoseFreeReport, SaysWhatCannotBeKnown) {
-  const v1::Report report = PoseFreeReport(Input(), Adequate());
+v1::Report ReportOf(distributions::PoseFreeComparison comparison) {
+  return ToReport(FromDistributions(Input(), std::move(comparison)));
+}
+
+TEST(FromDistributions, SaysWhatCannotBeKnown) {
+  const v1::Report report = ReportOf(Adequate());
   EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE);
   EXPECT_THAT(report.warnings(), Contains(HasSubstr("cannot be known")));
   EXPECT_THAT(report.warnings(), Contains(HasSubstr("faces of the bounding box")));
-  EXPECT_EQ(report.touches(), 72u);
-  EXPECT_DOUBLE_EQ(report.noise_floor_us(), 5000);
-  EXPECT_DOUBLE_EQ(report.distributions().energy_distance(), 2000);
+  ASSERT_EQ(report.data_size(), 1);
+  const v1::DataReport& data = report.data(0);
+  EXPECT_EQ(data.kind(), v1::DataReport::DISTRIBUTIONS);
+  EXPECT_EQ(data.unit(), "us");
+  EXPECT_EQ(data.count(), 72u);
+  EXPECT_DOUBLE_EQ(data.noise_floor(), 5000);
+  EXPECT_DOUBLE_EQ(data.initial().lack_of_fit_p(), 0.4);
+  EXPECT_DOUBLE_EQ(data.distributions().energy_distance(), 2000);
 }
 
-TEST(PoseFreeReport, NamesCompatibleEffectsAndNoCulprit) {
+TEST(FromDistributions, NamesCompatibleEffectsAndNoCulprit) {
   distributions::PoseFreeComparison comparison = Adequate();
   comparison.compatible = false;
   comparison.compatible_effects = {{"finger_length", "offset_mm = [1, -0.5, -0.5]", 0.6},
                                    {"channel_latency", "latency_us = [5e+04, 0, 0]", 0.4}};
-  const v1::Report report = PoseFreeReport(Input(), comparison);
+  const v1::Report report = ReportOf(comparison);
   EXPECT_EQ(report.verdict(), v1::Report::UNEXPLAINED);
   EXPECT_EQ(report.steps_size(), 0);
-  EXPECT_EQ(report.distributions().compatible_effects_size(), 2);
+  EXPECT_EQ(report.data(0).distributions().compatible_effects_size(), 2);
   EXPECT_THAT(report.summary(), HasSubstr("finger_length (offset_mm = [1, -0.5, -0.5])"));
   EXPECT_THAT(report.summary(), HasSubstr("write down the poses"));
 }
 
-TEST(PoseFreeReport, MakesNewNoiseAStepAndChangedNoiseARefit) {
+TEST(FromDistributions, MakesNewNoiseAStepAndChangedNoiseARefit) {
   distributions::PoseFreeComparison comparison = Adequate();
   comparison.noise_change = distributions::NoiseChange::kNewEffect;
-  v1::Report report = PoseFreeReport(Input(), comparison);
+  v1::Report report = ReportOf(comparison);
   EXPECT_EQ(report.verdict(), v1::Report::MISSING_EFFECTS);
   ASSERT_EQ(report.steps_size(), 1);
   EXPECT_EQ(report.steps(0).effect(), "gaussian_noise");
+  EXPECT_EQ(report.data(0).after_step_size(), 1);
   EXPECT_DOUBLE_EQ(report.steps(0).parameters(0).value(), 5000);
   EXPECT_THAT(report.improved_model_yaml(), HasSubstr("gaussian_noise"));
 
   comparison.noise_change = distributions::NoiseChange::kNewValue;
-  report = PoseFreeReport(Input(), comparison);
+  report = ReportOf(comparison);
   EXPECT_EQ(report.verdict(), v1::Report::ADEQUATE);
   ASSERT_EQ(report.refitted_size(), 1);
   EXPECT_DOUBLE_EQ(report.refitted(0).parameters(0).std_error(), 100);
 }
 
-TEST(PoseFreeReport, AsksForTheUnitOfTimesOfAnAbsurdSize) {
+TEST(FromDistributions, AsksForTheUnitOfTimesOfAnAbsurdSize) {
   distributions::PoseFreeComparison comparison = Adequate();
   comparison.size_ratio = 1000;
-  EXPECT_THAT(PoseFreeReport(Input(), comparison).warnings(), Contains(HasSubstr("is their unit us")));
+  EXPECT_THAT(ReportOf(comparison).warnings(), Contains(HasSubstr("is their unit us")));
 }
 
-TEST(PoseFreeReport, WithoutADiagnosisHasNoVerdict) {
+TEST(FromDistributions, WithoutADiagnosisHasNoVerdict) {
   distributions::PoseFreeComparison comparison = Adequate();
   comparison.diagnosed = false;
-  const v1::Report report = PoseFreeReport(Input(), comparison);
+  const v1::Report report = ReportOf(comparison);
   EXPECT_EQ(report.verdict(), v1::Report::VERDICT_UNSPECIFIED);
   EXPECT_EQ(report.summary(),
             "As distributions, the measured times do not differ from the model's (p = 0.4).");

@@ -1,0 +1,30 @@
+#include "server/diagnosis/report/diagnosis.h"
+
+#include <algorithm>
+
+namespace touchstone::diagnosis::report {
+
+const char* UnitOf(DataKind kind) {
+  switch (kind) {
+    case DataKind::kTouches:
+    case DataKind::kDistributions:
+      return "us";
+    case DataKind::kPhotographs:
+      return "grey";
+    case DataKind::kBoards:
+      return "px";
+  }
+  return "";
+}
+
+int SetAside::count() const {
+  int sum = 0;
+  for (const Rows& one : rows) sum += one.count;
+  return sum;
+}
+
+double ReducibleShare(const NoiseFloor& floor, double rmse) {
+  return rmse > 0 ? std::clamp(1 - floor.sigma * floor.sigma / (rmse * rmse), 0.0, 1.0) : 0;
+}
+
+}  // namespace touchstone::diagnosis::report

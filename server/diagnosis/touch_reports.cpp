@@ -1,0 +1,251 @@
+#include "server/diagnosis/touch_reports.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <optional>
+
+#include <absl/strings/str_cat.h>
+
+#include "server/base/status.h"
+#include "server/base/units.h"
+#include "server/diagnosis/checks/data_problems.h"
+#include "server/diagnosis/design/propose.h"
+#include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/early_verdicts.h"
+#include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/report/from_distributions.h"
+#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/selection/ladder.h"
+#include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/touch_modality.h"
+
+namespace touchstone::diagnosis {
+namespace {
+
+constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is confounded
+constexpr char kCancelled[] = "the diagnosis was cancelled";
+
+// Passes progress on from whatever thread works, one at a time, and remembers a cancellation.
+class ProgressGate {
+ public:
+  explicit ProgressGate(const DiagnosisContext& context) : context_(context) {}
+
+  // A stage and the share that is done by now. Returns false once cancelled.
+  bool Enter(const std::string& stage, double done) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stage_ = stage;
+    done_ = std::max(done_, done);
+    return Report();
+  }
+  // The same stage continues. Busy threads do not wait for each other.
+  bool Continue() {
+    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+    if (lock.owns_lock()) Report();
+    return !cancelled_;
+  }
+
+ private:
+  bool Report() {
+    if (context_.progress && !cancelled_ && !context_.progress(stage_, done_)) cancelled_ = true;
+    return !cancelled_;
+  }
+  const DiagnosisContext& context_;
+  std::mutex mutex_;
+  std::string stage_ = "reading";
+  double done_ = 0;
+  std::atomic<bool> cancelled_{false};
+};
+
+double Now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// The model's effects of photographs are no business of touches: a diagnosis works without them, and they come back
+// as they were into every model that it gives.
+struct PhotographEffects {
+  explicit PhotographEffects(const DiagnosisInput& input) : touches(input), given(input.model) {
+    for (const model::EffectInstance& instance : input.model->effects)
+      if (instance.effect->of_photos()) effects.push_back(instance);
+    if (!effects.empty())
+      touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
+  }
+  void PutBack(report::Diagnosis* diagnosis) const {
+    const auto put_back = [this](model::Model* model) {
+      model->effects.insert(model->effects.end(), effects.begin(), effects.end());
+    };
+    if (diagnosis->improved_model) put_back(&*diagnosis->improved_model);
+    for (report::Step& step : diagnosis->steps)
+      if (!step.model.effects.empty()) put_back(&step.model);
+  }
+  void NameGiven(report::Diagnosis* diagnosis) const {
+    diagnosis->model_name = given->name;
+    diagnosis->model_hash = given->Hash();
+  }
+
+  DiagnosisInput touches;  // the input without them
+  std::shared_ptr<const model::Model> given;
+  std::vector<model::EffectInstance> effects;
+};
+
+// The residuals of the initial and of the improved model, described.
+residuals::ResidualSummary DescribeBoth(const selection::Workspace& workspace,
+                                        const touches::Prediction& initial, const std::vector<double>& before,
+                                        const touches::Prediction& improved, const std::vector<double>& after,
+                                        double sigma_s) {
+  return residuals::DescribeResiduals(*workspace.observations, initial, improved, before, after,
+                                      {sigma_s, workspace.input.model->spacing_m, workspace.input.seed});
+}
+
+void AddSentences(report::Diagnosis* diagnosis) {
+  for (std::string& warning : report::DataWarnings(diagnosis->data[0]))
+    diagnosis->warnings.push_back(std::move(warning));
+  diagnosis->summary = report::Summarize(*diagnosis);
+}
+
+// Touches that would tell what fits equally well apart. Always asked for by Propose; Diagnose asks only where
+// something is confounded.
+absl::Status AddNextTouches(const selection::Workspace& workspace,
+                            const selection::SelectionResult& selection, const selection::Ladder& ladder,
+                            int max_touches, bool always, report::Diagnosis* diagnosis) {
+  const engine::ExplanationsLeft left =
+      engine::FindExplanationsLeft(selection.fit, selection.steps, ladder.improved);
+  if (!left.confounded && !always) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const std::vector<design::ProposedTouch> touches,
+      design::ProposeTouches(*workspace.searched, left.models, ladder.noise_floor.sigma, max_touches,
+                             workspace.input.seed, workspace.context.pool));
+  diagnosis->next.assign(touches.begin(), touches.end());
+  if (!always || !touches.empty()) return absl::OkStatus();
+  diagnosis->warnings.push_back(
+      left.models.size() < 2
+          ? "No touch would tell more than those at hand."
+          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name, ": ",
+                         engine::DiscriminatingMeasurement({left.models[0].name, left.models[1].name})));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<report::Diagnosis> DiagnosePoseFree(const DiagnosisInput& input,
+                                                   const DiagnosisContext& context, bool with_verdict) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(distributions::PoseFreeComparison comparison,
+                              distributions::ComparePoseFree(input, context, with_verdict));
+  return report::FromDistributions(input, std::move(comparison));
+}
+
+// `always`: Propose, which names touches even where nothing is confounded.
+absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max_touches, bool always,
+                                            const DiagnosisContext& context) {
+  if (!input.set->has_poses) return DiagnosePoseFree(input, context, true);
+  const double began = Now();
+  ProgressGate gate(context);
+  DiagnosisContext gated = context;
+  gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::DataProblem> problems,
+                              checks::FindDataProblems(input, gated));
+  if (!problems.empty()) {
+    report::Diagnosis diagnosis = CheckDataReport(input, gated, problems);
+    diagnosis.duration_s = Now() - began;
+    return diagnosis;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
+                              selection::MakeWorkspace(input, gated));
+  workspace->experiment.cancelled = [&gate] { return !gate.Continue(); };
+  if (!gate.Enter("fitting", 0.1)) return absl::CancelledError(kCancelled);
+  const touches::Observations& o = *workspace->observations;
+  const int touches_needed = TouchesNeeded(o);
+  const bool none_used = std::none_of(o.used.begin(), o.used.end(), [](char used) { return used; });
+  if (touches_needed > 0 && (!always || none_used)) {
+    report::Diagnosis diagnosis = TooLittleDataReport(*workspace, touches_needed);
+    diagnosis.duration_s = Now() - began;
+    return diagnosis;
+  }
+  // As a comparison finds it: the search leaves out outliers.
+  const double compared_s = touches::Rmse(o, touches::Residuals(o, workspace->nominal));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::SelectionResult selection,
+                              selection::SelectExplanation(workspace.get()));
+  if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
+  report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
+  const std::vector<double> before = touches::Residuals(o, workspace->nominal);
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
+                              selection::QualityOf(*workspace, selection.initial_model, before));
+  selection::SetError(compared_s, &quality);
+  diagnosis.data[0].initial = report::QualityOf(quality);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
+  report::AddLadder(ladder, &diagnosis);
+  if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
+  // A part of a joint diagnosis describes what the model had left before anything was put in place.
+  touches::Prediction initial = workspace->nominal;
+  if (input.initial_model != nullptr) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(initial, workspace->predictor->Run(*input.initial_model, true, true));
+  }
+  report::AddResiduals(DescribeBoth(*workspace, initial, touches::Residuals(o, initial), ladder.prediction,
+                                    ladder.residuals, ladder.noise_floor.sigma_s),
+                       &diagnosis.data[0]);
+  AddSentences(&diagnosis);
+  TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
+  if (touches_needed > 0) {
+    // So few touches say where to touch next, and no more.
+    report::Diagnosis little = TooLittleDataReport(*workspace, touches_needed);
+    little.next = std::move(diagnosis.next);
+    little.warnings = std::move(diagnosis.warnings);
+    diagnosis = std::move(little);
+  }
+  diagnosis.duration_s = Now() - began;
+  gate.Enter("done", 1);
+  return diagnosis;
+}
+
+absl::StatusOr<report::Diagnosis> WithPhotographEffects(const DiagnosisInput& input, int max_touches,
+                                                        bool always, const DiagnosisContext& context) {
+  const PhotographEffects photographs(input);
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis diagnosis,
+                              Diagnosed(photographs.touches, max_touches, always, context));
+  photographs.PutBack(&diagnosis);
+  photographs.NameGiven(&diagnosis);
+  return diagnosis;
+}
+
+}  // namespace
+
+absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
+                                                 const DiagnosisContext& context) {
+  const PhotographEffects photographs(given);
+  const DiagnosisInput& input = photographs.touches;
+  if (!input.set->has_poses) return DiagnosePoseFree(input, context, false);
+  const double began = Now();
+  ProgressGate gate(context);
+  DiagnosisContext gated = context;
+  gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
+                              selection::MakeWorkspace(input, gated));
+  if (!gate.Enter("comparing", 0.3)) return absl::CancelledError(kCancelled);
+  const touches::Observations& o = *workspace->observations;
+  report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
+  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
+  AddHowWrong(*workspace, residuals, &diagnosis);
+  report::DataReport& data = diagnosis.data[0];
+  if (data.noise_floor)
+    report::AddResiduals(DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,
+                                      residuals, data.noise_floor->sigma * kSecondsPerMicrosecond),
+                         &data);
+  photographs.NameGiven(&diagnosis);
+  AddSentences(&diagnosis);
+  diagnosis.duration_s = Now() - began;
+  return diagnosis;
+}
+
+absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input,
+                                                  const DiagnosisContext& context) {
+  return WithPhotographEffects(input, kDefaultTouches, false, context);
+}
+
+absl::StatusOr<report::Diagnosis> ProposeTouches(const DiagnosisInput& input, int max_touches,
+                                                 const DiagnosisContext& context) {
+  return WithPhotographEffects(input, max_touches, true, context);
+}
+
+}  // namespace touchstone::diagnosis
