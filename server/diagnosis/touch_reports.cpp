@@ -173,7 +173,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
                               selection::QualityOf(*workspace, selection.initial_model, before));
   selection::SetError(compared_s, &quality);
-  diagnosis.data[0].initial = report::QualityOf(quality);
+  diagnosis.data[0].initial = report::InMicroseconds(quality);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   report::AddLadder(ladder, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);

@@ -23,13 +23,9 @@ enum class DataKind { kTouches, kPhotographs, kBoards, kDistributions };
 // "us", "grey" or "px".
 const char* UnitOf(DataKind kind);
 
-struct Quality {
-  double rmse = 0;  // as a comparison finds it
-  double heldout_rmse = 0;
-  double lack_of_fit_p = 0;  // 0 to 1
-};
+using engine::Quality;  // in the unit of the entry
 
-// As selection::NoiseFloor.
+// As engine::NoiseFloor.
 struct NoiseFloor {
   double sigma = 0;
   double lower = 0, upper = 0;  // 95 % interval; 0 if unknown
@@ -97,7 +93,7 @@ struct Curve {
   std::vector<OfFinger> fingers;
 };
 
-// What no effect of the catalogue explains; as selection::UnexplainedRest.
+// What no effect of the catalogue explains; as engine::UnexplainedRest.
 struct Unexplained {
   std::vector<engine::CovariateTest> covariates;
   std::string formula, formula_yaml, lookup_yaml, words;

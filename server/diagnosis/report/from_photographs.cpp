@@ -11,16 +11,12 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-Quality QualityOf(const engine::Quality& quality) {
-  return {quality.rmse, quality.heldout_rmse, quality.lack_of_fit_p};
-}
-
 void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
   diagnosis->refitted = found.refitted;
   for (const engine::LadderStep& step : found.steps) {
     diagnosis->steps.push_back(StepOf(step));
-    data.after_step.push_back(QualityOf(step.quality));
+    data.after_step.push_back(step.quality);
   }
   diagnosis->confounded = found.confounded;
   diagnosis->superfluous = found.superfluous;
@@ -122,8 +118,8 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   data.noise_floor->upper = found.noise_floor.upper;
   data.noise_floor->degrees_of_freedom = found.noise_floor.degrees_of_freedom;
   data.noise_floor->from_repeats = found.noise_floor.from_repeats;
-  if (found.initial) data.initial = QualityOf(*found.initial);
-  if (found.final) data.final = QualityOf(*found.final);
+  if (found.initial) data.initial = *found.initial;
+  if (found.final) data.final = *found.final;
   data.reducible_share = found.reducible_share;
   AddWhere(found, set, &data);
   AddCauses(found, &diagnosis);

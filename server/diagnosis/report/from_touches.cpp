@@ -65,7 +65,7 @@ DataReport DataOfTouches(const touches::DataSummary& set) {
   return data;
 }
 
-Quality QualityOf(const engine::Quality& quality) {
+Quality InMicroseconds(const engine::Quality& quality) {
   return {Microseconds(quality.rmse), Microseconds(quality.heldout_rmse), quality.lack_of_fit_p};
 }
 
@@ -90,12 +90,12 @@ void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
   diagnosis->verdict = ladder.verdict;
   data.noise_floor = NoiseFloorOf(ladder.noise_floor);
-  data.final = QualityOf(ladder.final);
+  data.final = InMicroseconds(ladder.final);
   data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
   diagnosis->refitted = ladder.refitted;
   for (const engine::LadderStep& step : ladder.steps) {
     diagnosis->steps.push_back(StepOf(step));
-    data.after_step.push_back(QualityOf(step.quality));
+    data.after_step.push_back(InMicroseconds(step.quality));
   }
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;

@@ -11,7 +11,7 @@ namespace touchstone::diagnosis::report {
 // The set, without errors.
 DataReport DataOfTouches(const touches::DataSummary& set);
 
-Quality QualityOf(const engine::Quality& quality);
+Quality InMicroseconds(const engine::Quality& quality);
 NoiseFloor NoiseFloorOf(const engine::NoiseFloor& floor);
 DataProblem DataProblemOfTouches(const engine::DataProblem& problem);
 
