@@ -14,7 +14,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/boards/board_fit.h"
+#include "server/diagnosis/boards/board_set.h"
 #include "server/diagnosis/inference/parameter_estimate.h"
 #include "server/diagnosis/selection/result.h"
 #include "server/model/model.h"
@@ -63,8 +63,7 @@ struct BoardDiagnosis {
   BoardNoise noise;
   std::vector<BoardStep> steps;
   std::vector<BoardRest> rest;
-  int pictures_needed = 0;               // with kTooLittleData
-  LensVector lens = LensVector::Zero();  // beside the nominal one, with all steps
+  int pictures_needed = 0;  // with kTooLittleData
   std::string improved_model_yaml, improved_model_hash;
   std::string summary;
   std::vector<std::string> warnings;
@@ -73,8 +72,5 @@ struct BoardDiagnosis {
 
 // `model`: its effects of the projection are part of the nominal lens. The seed draws the resampled pictures.
 absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::Model& model, uint64_t seed);
-
-// The lens that a model makes of the nominal one: what focal_error, principal_point and radial_distortion do.
-session::CameraIntrinsics LensOfModel(const session::CameraIntrinsics& nominal, const model::Model& model);
 
 }  // namespace touchstone::diagnosis::boards

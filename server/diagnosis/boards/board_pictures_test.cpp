@@ -17,6 +17,7 @@
 #include "server/base/test_paths.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
+#include "server/diagnosis/boards/board_test_set.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
@@ -75,7 +76,7 @@ TEST(BoardPictures, CornersAreFoundWhereTheyWereDrawn) {
     double here = 0;
     for (int k = 0; k < board.corners(); ++k) {
       ProjectedCorner drawn;
-      ASSERT_TRUE(ProjectCorner(camera, LensVector::Zero(), pose,
+      ASSERT_TRUE(ProjectCorner(PhotoLensOf(camera), pose,
                                 board.CornerM(turned ? board.corners() - 1 - k : k), &drawn));
       here += (set->pictures[0].corners_px[k] - drawn.px).squaredNorm() / board.corners();
     }
