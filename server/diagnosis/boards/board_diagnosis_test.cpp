@@ -136,5 +136,13 @@ TEST(BoardDiagnosis, IsTheSameEveryTimeAndErrorsFollowTheSeed) {
   EXPECT_EQ(one.summary, again.summary);
 }
 
+TEST(BoardDiagnosis, TakesOnePictureSixTimes) {
+  BoardSet set = MakeBoardSet(LensWith({{kFocal, 0.05}, {kK1, -0.2}}), 1, 0.2, 12);
+  while (set.pictures.size() < 6) set.pictures.push_back(set.pictures[0]);
+  const BoardDiagnosis diagnosis = Diagnosed(set);
+  ASSERT_TRUE(diagnosis.final.has_value());
+  EXPECT_LE(diagnosis.final->rmse_px, diagnosis.initial->rmse_px);
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis::boards

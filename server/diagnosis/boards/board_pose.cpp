@@ -12,7 +12,7 @@ namespace touchstone::diagnosis::boards {
 namespace {
 
 constexpr int kMaxIterations = 200;
-constexpr double kConverged = 1e-12;  // relative fall of the sum of squares
+constexpr double kConverged = 1e-9;  // relative fall of the sum of squares by the last step
 constexpr double kMaxDamping = 1e12;
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;

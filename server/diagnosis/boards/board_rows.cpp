@@ -1,14 +1,11 @@
 #include "server/diagnosis/boards/board_rows.h"
 
-#include <algorithm>
 #include <set>
 
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
-
-constexpr int kPoseNumbers = 12;
 
 using MapOfVector = Eigen::Map<const Eigen::VectorXd>;
 
@@ -30,41 +27,18 @@ image::PhotoLens BoardRows::LensOf(const model::Model& model) const {
   return LensOfModel(set_.camera, WithEffectsOf(given_, model));
 }
 
-std::vector<double> BoardRows::PredictFrom(const model::Model& model,
-                                           const std::vector<BoardPose>& start) const {
+absl::StatusOr<std::vector<double>> BoardRows::Predict(const model::Model& model) const {
   const image::PhotoLens lens = LensOf(model);
   std::vector<double> predicted;
-  predicted.reserve(rows() + pictures() * kPoseNumbers);
-  std::vector<BoardPose> poses;
   ProjectedCorner projected;
   for (int picture = 0; picture < pictures(); ++picture) {
-    poses.push_back(FitPose(set_, lens, picture, start[picture]));
+    const BoardPose pose = FitPose(set_, lens, picture, nominal_poses_[picture]);
     for (int corner = 0; corner < set_.board.corners(); ++corner) {
-      ProjectCorner(lens, poses[picture], set_.board.CornerM(corner), &projected);
+      ProjectCorner(lens, pose, set_.board.CornerM(corner), &projected);
       predicted.insert(predicted.end(), projected.px.begin(), projected.px.end());
     }
   }
-  for (const BoardPose& pose : poses) {
-    predicted.insert(predicted.end(), pose.rotation.data(), pose.rotation.data() + 9);
-    predicted.insert(predicted.end(), pose.translation_m.begin(), pose.translation_m.end());
-  }
   return predicted;
-}
-
-absl::StatusOr<std::vector<double>> BoardRows::Predict(const model::Model& model) const {
-  return PredictFrom(model, nominal_poses_);
-}
-
-absl::StatusOr<std::vector<double>> BoardRows::PredictNear(const model::Model& moved, const model::Model&,
-                                                           const std::vector<double>& predicted) const {
-  std::vector<BoardPose> start(pictures());
-  const double* numbers = predicted.data() + rows();
-  for (BoardPose& pose : start) {
-    std::copy(numbers, numbers + 9, pose.rotation.data());
-    std::copy(numbers + 9, numbers + kPoseNumbers, pose.translation_m.data());
-    numbers += kPoseNumbers;
-  }
-  return PredictFrom(moved, start);
 }
 
 Eigen::VectorXd BoardRows::Residual(const std::vector<double>& predicted) const {

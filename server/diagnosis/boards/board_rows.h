@@ -28,11 +28,8 @@ class BoardRows : public inference::ObservationModel {
   int BlockOfRow(int row) const override { return GroupOfRow(row); }
   double TimeOfRow(int) const override { return 0; }  // a lens does not change
 
-  // u and v of every corner, picture by picture; behind them the poses that were fitted, 12 numbers each.
+  // u and v of every corner, picture by picture.
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override;
-  // The poses are fitted from those of `predicted`.
-  absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model& at,
-                                                  const std::vector<double>& predicted) const override;
   Eigen::VectorXd Residual(const std::vector<double>& predicted) const override;
   Eigen::VectorXd Change(const std::vector<double>& predicted,
                          const std::vector<double>& moved) const override;
@@ -48,7 +45,6 @@ class BoardRows : public inference::ObservationModel {
   int pictures() const { return static_cast<int>(set_.pictures.size()); }
   int rows_per_picture() const { return 2 * set_.board.corners(); }
   image::PhotoLens LensOf(const model::Model& model) const;
-  std::vector<double> PredictFrom(const model::Model& model, const std::vector<BoardPose>& start) const;
 
   const BoardSet& set_;
   model::Model given_;
