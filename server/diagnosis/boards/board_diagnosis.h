@@ -3,7 +3,7 @@
 // Observations are the corners, px; every picture's pose of the board is a nuisance that is always fitted. Explanations are
 // the catalogue's effects of the projection (focal_error, principal_point, radial_distortion) and, to keep those honest, what
 // a lens may do besides, which has no effect: it can only be named as a rest. An effect is claimed where the corners are
-// kMinGainNats more probable with it (BIC over readings, sigma unknown) and pictures that the fit did not see are predicted
+// kMinGainNats more probable with it (the engine's evidence, sigma unknown) and pictures that the fit did not see are predicted
 // better: the lens is fitted without the picture, its pose to one half of its corners (like the colours of a chessboard), the
 // error is that of the other half, and the other way round.
 #pragma once
