@@ -73,6 +73,20 @@ Eigen::Vector2d PhotoLens::Project(const Eigen::Vector3d& point_in_camera) const
   return {fx * distorted.x() + cx, fy * distorted.y() + cy};
 }
 
+Eigen::Matrix<double, 2, 3> PhotoLens::ProjectDerivative(const Eigen::Vector3d& point_in_camera) const {
+  const double x = point_in_camera.x() / point_in_camera.z(), y = point_in_camera.y() / point_in_camera.z();
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const double slope = k1 + r2 * (2 * k2 + r2 * 3 * k3);  // d radial / d r2
+  const double across = 2 * x * y * slope + 2 * p1 * x + 2 * p2 * y;
+  Eigen::Matrix2d by_ideal;
+  by_ideal << fx * (radial + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x), fx * across, fy * across,
+      fy * (radial + 2 * y * y * slope + 6 * p1 * y + 2 * p2 * x);
+  Eigen::Matrix<double, 2, 3> ideal_by_point;
+  ideal_by_point << 1, 0, -x, 0, 1, -y;
+  return by_ideal * ideal_by_point / point_in_camera.z();
+}
+
 double PhotoLens::FoldRadiusSquared() const {
   // The least positive root of 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3, s = r^2, beyond which r * radial falls.
   const auto slope = [this](double s) { return 1 + s * (3 * k1 + s * (5 * k2 + s * 7 * k3)); };

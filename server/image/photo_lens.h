@@ -25,6 +25,8 @@ struct PhotoLens {
   Eigen::Vector2d Distort(const Eigen::Vector2d& ideal) const;
   // Where a point of the camera frame (z > 0) lies in the picture, px.
   Eigen::Vector2d Project(const Eigen::Vector3d& point_in_camera) const;
+  // By the point.
+  Eigen::Matrix<double, 2, 3> ProjectDerivative(const Eigen::Vector3d& point_in_camera) const;
   // Square of the radius up to which the radial part grows: beyond it the lens model folds the picture over, and no
   // pixel looks there. Infinite if it always grows.
   double FoldRadiusSquared() const;

@@ -26,13 +26,13 @@ BoardDiagnosis Diagnosed(const BoardSet& set, const model::Model& model = model:
 
 std::vector<std::string> Named(const BoardDiagnosis& diagnosis) {
   std::vector<std::string> names;
-  for (const BoardStep& step : diagnosis.steps) names.push_back(step.effect);
+  for (const engine::LadderStep& step : diagnosis.steps) names.push_back(step.effect);
   return names;
 }
 
 const engine::ParameterEstimate* Find(const BoardDiagnosis& diagnosis, const std::string& parameter,
                                       const std::string& axis = "") {
-  for (const BoardStep& step : diagnosis.steps)
+  for (const engine::LadderStep& step : diagnosis.steps)
     for (const engine::ParameterEstimate& estimate : step.parameters)
       if (estimate.name == parameter && estimate.entry == axis) return &estimate;
   return nullptr;
@@ -62,7 +62,7 @@ TEST(BoardDiagnosis, NamesEachEffectOfTheProjectionAlone) {
     EXPECT_EQ(diagnosis.verdict, Verdict::kMissingEffects) << diagnosis.summary;
     ASSERT_TRUE(diagnosis.final.has_value());
     // Two readings a corner.
-    EXPECT_NEAR(diagnosis.final->heldout_rmse_px, 0.2 * std::sqrt(2.0), 0.03);
+    EXPECT_NEAR(diagnosis.final->heldout_rmse, 0.2 * std::sqrt(2.0), 0.03);
   }
 }
 
@@ -85,7 +85,7 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
     EXPECT_LT(estimate->lower, estimate->value);
   }
   EXPECT_LT(std::abs(Find(diagnosis, "k1")->value + 0.28), 0.02);
-  for (const BoardStep& step : diagnosis.steps) EXPECT_GT(step.probability, 0.99) << step.effect;
+  for (const engine::LadderStep& step : diagnosis.steps) EXPECT_GT(step.probability, 0.99) << step.effect;
   // Through the improved model nothing is missing any more.
   ASSERT_TRUE(diagnosis.improved_model);
   EXPECT_EQ(Diagnosed(set, *diagnosis.improved_model).verdict, Verdict::kAdequate);
@@ -115,7 +115,7 @@ TEST(BoardDiagnosis, LeavesWhatHasNoEffectNameless) {
   ASSERT_FALSE(diagnosis.rest.empty());
   EXPECT_EQ(diagnosis.rest[0].name, "tangential distortion");
   EXPECT_THAT(diagnosis.summary, HasSubstr("p1 0.0"));
-  EXPECT_LT(diagnosis.rest.back().quality.heldout_rmse_px, diagnosis.final->heldout_rmse_px);
+  EXPECT_LT(diagnosis.rest.back().quality.heldout_rmse, diagnosis.final->heldout_rmse);
 }
 
 TEST(BoardDiagnosis, SaysThatThereAreTooFewPictures) {
@@ -132,6 +132,14 @@ TEST(BoardDiagnosis, IsTheSameEveryTimeAndErrorsFollowTheSeed) {
   EXPECT_EQ(Find(one, "k1")->std_error, Find(again, "k1")->std_error);
   EXPECT_NE(Find(one, "k1")->std_error, Find(other, "k1")->std_error);
   EXPECT_EQ(one.summary, again.summary);
+}
+
+TEST(BoardDiagnosis, TakesOnePictureSixTimes) {
+  BoardSet set = MakeBoardSet(LensWith({{kFocal, 0.05}, {kK1, -0.2}}), 1, 0.2, 12);
+  while (set.pictures.size() < 6) set.pictures.push_back(set.pictures[0]);
+  const BoardDiagnosis diagnosis = Diagnosed(set);
+  ASSERT_TRUE(diagnosis.final.has_value());
+  EXPECT_LE(diagnosis.final->rmse, diagnosis.initial->rmse);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "server/base/test_paths.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
+#include "server/diagnosis/boards/board_test_set.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
@@ -75,7 +76,7 @@ TEST(BoardPictures, CornersAreFoundWhereTheyWereDrawn) {
     double here = 0;
     for (int k = 0; k < board.corners(); ++k) {
       ProjectedCorner drawn;
-      ASSERT_TRUE(ProjectCorner(camera, LensVector::Zero(), pose,
+      ASSERT_TRUE(ProjectCorner(PhotoLensOf(camera), pose,
                                 board.CornerM(turned ? board.corners() - 1 - k : k), &drawn));
       here += (set->pictures[0].corners_px[k] - drawn.px).squaredNorm() / board.corners();
     }
@@ -112,7 +113,7 @@ TEST(BoardPictures, RefusalsSayWhatWasExpected) {
 
 struct OpenCvLens {
   cv::Mat matrix, distortion;
-  double rmse_px = 0;
+  double rmse = 0;
 };
 
 std::vector<cv::Point3f> PointsOf(const BoardLayout& board, int parity) {
@@ -143,7 +144,7 @@ OpenCvLens Calibrate(const BoardSet& set, size_t without) {
   }
   OpenCvLens lens;
   std::vector<cv::Mat> turns, shifts;
-  lens.rmse_px = cv::calibrateCamera(points, corners, cv::Size(set.camera.width_px, set.camera.height_px),
+  lens.rmse = cv::calibrateCamera(points, corners, cv::Size(set.camera.width_px, set.camera.height_px),
                                      lens.matrix, lens.distortion, turns, shifts);
   return lens;
 }
@@ -173,8 +174,8 @@ TEST(BoardPictures, RealPicturesNameRadialDistortionAndAgreeWithOpenCvsCalibrati
   ASSERT_EQ(set->pictures.size(), 13u);
   const absl::StatusOr<BoardDiagnosis> diagnosis = DiagnoseBoards(*set, model::NominalModel(), 0);
   ASSERT_TRUE(diagnosis.ok()) << diagnosis.status();
-  const BoardStep* radial = nullptr;
-  for (const BoardStep& step : diagnosis->steps)
+  const engine::LadderStep* radial = nullptr;
+  for (const engine::LadderStep& step : diagnosis->steps)
     if (step.effect == "radial_distortion") radial = &step;
   ASSERT_NE(radial, nullptr) << diagnosis->summary;
   EXPECT_GT(radial->probability, 0.99);
@@ -186,15 +187,15 @@ TEST(BoardPictures, RealPicturesNameRadialDistortionAndAgreeWithOpenCvsCalibrati
   for (size_t i = 0; i < set->pictures.size(); ++i)
     their_squares += OpenCvUnseenSquares(*set, Calibrate(*set, i), i);
   const double their_unseen = std::sqrt(their_squares / diagnosis->corners);
-  EXPECT_LT(diagnosis->final->heldout_rmse_px, 1.05 * their_unseen);
-  EXPECT_GT(diagnosis->initial->heldout_rmse_px, 3 * their_unseen);
+  EXPECT_LT(diagnosis->final->heldout_rmse, 1.05 * their_unseen);
+  EXPECT_GT(diagnosis->initial->heldout_rmse, 3 * their_unseen);
   std::printf(
       "k1 %.4f +- %.4f, OpenCV %.4f; left-out pictures %.4f px before, %.4f after, OpenCV %.4f; all pictures "
       "%.4f, "
       "%.4f, OpenCV %.4f\n%s\n",
       radial->parameters[0].value, radial->parameters[0].std_error, their_k1,
-      diagnosis->initial->heldout_rmse_px, diagnosis->final->heldout_rmse_px, their_unseen,
-      diagnosis->initial->rmse_px, diagnosis->final->rmse_px, theirs.rmse_px, diagnosis->summary.c_str());
+      diagnosis->initial->heldout_rmse, diagnosis->final->heldout_rmse, their_unseen,
+      diagnosis->initial->rmse, diagnosis->final->rmse, theirs.rmse, diagnosis->summary.c_str());
 }
 
 }  // namespace

@@ -2,130 +2,114 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <optional>
 
 #include "server/base/distributions.h"
+#include "server/base/status.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
+#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/competition.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
 
-// Of the mean over pictures of the logarithm of the ratio of two errors, in its standard errors.
-constexpr double kMinPicturesAgree = 2;
+// Corners that are met exactly (made up ones) have no likelihood: nothing is better than a thousandth of a pixel.
+constexpr double kFloorPx = 1e-3;
 
-bool Holds(const std::vector<int>& terms, int term) {
-  return std::find(terms.begin(), terms.end(), term) != terms.end();
-}
-
-std::vector<int> Without(std::vector<int> terms, int term) {
-  terms.erase(std::remove(terms.begin(), terms.end(), term), terms.end());
-  return terms;
-}
-
-// Of the logarithm of a left-out picture's error, from one lens to the other.
-struct MeanFall {
-  double mean = 0, std_error = 0;
-};
-
-MeanFall MeanFallOf(const LensChoice& from, const LensChoice& to) {
-  const double count = static_cast<double>(from.unseen_px2.size());
-  double sum = 0, squares = 0;
-  for (size_t i = 0; i < from.unseen_px2.size(); ++i) {
-    const double fall = std::log((from.unseen_px2[i] + 1e-9) / (to.unseen_px2[i] + 1e-9));
-    sum += fall, squares += fall * fall;
-  }
-  const double mean = sum / count;
-  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / (count - 1))};
+// A gain is claimed where pictures agree on it: two standard errors over them; a share of the error is not asked, since a
+// lens that is off by little shows in a few corners only.
+engine::SearchRules RulesOfBoards() {
+  engine::SearchRules rules;
+  rules.enter_nats = rules.equivalent_nats = kMinGainNats;
+  rules.min_relative_cv_gain = 0;
+  rules.min_cv_gain_std_errors = 2;
+  return rules;
 }
 
 }  // namespace
 
-double SumOf(const std::vector<double>& squares) {
-  return std::accumulate(squares.begin(), squares.end(), 0.0);
+BoardSearch::BoardSearch(std::unique_ptr<BoardRows> rows)
+    : rows_(std::move(rows)), likelihood_(rows_->GroupRows(), nullptr, kFloorPx, nullptr) {
+  experiment_.observations = rows_.get();
+  experiment_.likelihood = &likelihood_;
+  likelihood_.SetEliminated(rows_->EliminatedValues());
+  all_ = NamedLensEffects();
+  for (auto& effect : NamelessLensEffects()) all_.push_back(std::move(effect));
 }
 
-std::vector<int> FreeEntries(const std::vector<int>& terms) {
-  std::vector<int> free;
-  for (const int term : terms)
-    free.insert(free.end(), LensTerms()[term].entries.begin(), LensTerms()[term].entries.end());
-  return free;
+absl::StatusOr<std::unique_ptr<BoardSearch>> BoardSearch::Make(const BoardSet& set,
+                                                               const model::Model& given) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<BoardRows> rows, BoardRows::Make(set, given));
+  return std::unique_ptr<BoardSearch>(new BoardSearch(std::move(rows)));
 }
 
-LensChoice FitChoice(const BoardSet& set, const BoardFit& start, const std::vector<int>& terms) {
-  const int pictures = static_cast<int>(set.pictures.size());
-  const std::vector<int> free = FreeEntries(terms);
-  LensChoice choice;
-  choice.terms = terms;
-  BoardFit from = start;
-  // What is not free any more goes back to the nominal lens.
-  for (int entry = 0; entry < kLensEntries; ++entry)
-    if (std::find(free.begin(), free.end(), entry) == free.end()) from.lens[entry] = 0;
-  choice.fit = FitBoards(set, from, free);
-  const double readings = 2.0 * pictures * set.board.corners();
-  // Corners that are met exactly (made up ones) have no likelihood: nothing is better than a thousandth of a pixel.
-  const double variance = std::max(choice.fit.sum_px2 / readings, 1e-6);
-  choice.log_evidence =
-      -0.5 * readings * std::log(variance) - 0.5 * static_cast<double>(free.size()) * std::log(readings);
-  for (int i = 0; i < pictures; ++i) {
-    std::vector<double> others(pictures, 1.0);
-    others[i] = 0;
-    const BoardFit left_out = free.empty() ? choice.fit : FitBoards(set, choice.fit, free, others);
-    choice.unseen_px2.push_back(UnseenSquares(set, left_out, i));
+engine::StepwiseSearch BoardSearch::SearchAmong(const Effects& effects) const {
+  std::vector<engine::Candidate> candidates;
+  for (const auto& effect : effects) {
+    engine::Candidate& candidate = candidates.emplace_back();
+    candidate.effect = effect;
+    candidate.nameless = effects::Catalogue().Find(effect->name) == nullptr;
   }
-  return choice;
+  return engine::StepwiseSearch(experiment_, std::move(candidates), RulesOfBoards(),
+                                   [](const std::string&) {});
 }
 
-bool PredictsBetter(const LensChoice& more, const LensChoice& less) {
-  if (!(SumOf(more.unseen_px2) < SumOf(less.unseen_px2))) return false;
-  const MeanFall fall = MeanFallOf(less, more);
-  return fall.mean > kMinPicturesAgree * fall.std_error;
+absl::StatusOr<LensFit> BoardSearch::Measured(engine::Fit fit) const {
+  LensFit lens;
+  TOUCHSTONE_ASSIGN_OR_RETURN(lens.unseen_px2, engine::HeldOutSquaresRefitted(experiment_, fit));
+  lens.fit = std::move(fit);
+  return lens;
 }
 
-double LackOfFitP(const LensChoice& less, const LensChoice& more) {
-  const MeanFall fall = MeanFallOf(less, more);
+absl::StatusOr<std::vector<LensFit>> BoardSearch::Ladder(engine::Fit found, int first) const {
+  std::vector<LensFit> ladder;
+  for (;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(LensFit lens, Measured(std::move(found)));
+    ladder.push_back(std::move(lens));
+    const engine::Parameterization& model = ladder.back().fit.model;
+    const int effects = static_cast<int>(model.base().effects.size());
+    if (effects == first) break;
+    TOUCHSTONE_ASSIGN_OR_RETURN(found, engine::FitModel(experiment_, model.Without(effects - 1)));
+  }
+  std::reverse(ladder.begin(), ladder.end());
+  return ladder;
+}
+
+absl::StatusOr<std::vector<LensFit>> BoardSearch::FindNamed() const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      engine::Explanation found,
+      SearchAmong(NamedLensEffects()).Run(engine::Parameterization(model::NominalModel(), {}), 0));
+  return Ladder(std::move(found.fit), 0);
+}
+
+absl::StatusOr<std::vector<LensFit>> BoardSearch::FindNameless(const LensFit& lens) const {
+  const int named = static_cast<int>(lens.fit.model.base().effects.size());
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation found,
+                              SearchAmong(NamelessLensEffects()).Run(lens.fit.model, named));
+  return Ladder(std::move(found.fit), named);
+}
+
+absl::StatusOr<LensFit> BoardSearch::FitAll(const LensFit& lens) const {
+  engine::Parameterization model = lens.fit.model;
+  for (const auto& effect : all_) {
+    const std::vector<model::EffectInstance>& present = model.base().effects;
+    if (std::none_of(present.begin(), present.end(),
+                     [&](const model::EffectInstance& other) { return other.effect->name == effect->name; }))
+      model.Add(effect, false);
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(experiment_, std::move(model)));
+  return Measured(std::move(fit));
+}
+
+absl::StatusOr<std::vector<engine::SelectedStep>> BoardSearch::Compete(const LensFit& lens) const {
+  return engine::FindCompetitors(SearchAmong(all_), {lens.fit, 0}, -1, {});
+}
+
+double LackOfFitP(const LensFit& less, const LensFit& more) {
+  const engine::HeldOutFall fall =
+      engine::FallOfHeldOut(less.unseen_px2, more.unseen_px2, kFloorPx * kFloorPx);
   if (!(fall.std_error > 0)) return fall.mean > 0 ? 0 : 1;
   return StudentTail(fall.mean / fall.std_error, static_cast<double>(more.unseen_px2.size()) - 1);
-}
-
-LensSearch SearchNamed(const BoardSet& set, const BoardFit& start) {
-  LensSearch search;
-  search.ladder.push_back(FitChoice(set, start, {}));
-  for (;;) {
-    const LensChoice& now = search.ladder.back();
-    std::optional<LensChoice> best;
-    for (int term = 0; term < static_cast<int>(LensTerms().size()); ++term) {
-      if (!LensTerms()[term].named || Holds(now.terms, term)) continue;
-      std::vector<int> terms = now.terms;
-      terms.push_back(term);
-      LensChoice tried = FitChoice(set, now.fit, terms);
-      if (!best.has_value() || tried.log_evidence > best->log_evidence) best = std::move(tried);
-    }
-    if (!best.has_value()) break;
-    const double gain = best->log_evidence - now.log_evidence;
-    if (gain < kMinGainNats || !PredictsBetter(*best, now)) break;
-    search.gain_nats.push_back(gain);
-    search.ladder.push_back(std::move(*best));
-  }
-  // What the later steps have made needless goes, and the ladder is climbed anew without it.
-  for (size_t k = 0; search.ladder.back().terms.size() > 1 && k < search.ladder.back().terms.size();) {
-    const LensChoice& last = search.ladder.back();
-    const std::vector<int> fewer = Without(last.terms, last.terms[k]);
-    LensChoice without = FitChoice(set, last.fit, fewer);
-    if (last.log_evidence - without.log_evidence >= kMinGainNats) {
-      ++k;
-      continue;
-    }
-    search.ladder.resize(1);
-    search.gain_nats.clear();
-    for (size_t count = 1; count <= fewer.size(); ++count) {
-      search.ladder.push_back(FitChoice(set, search.ladder.back().fit,
-                                        {fewer.begin(), fewer.begin() + static_cast<long>(count)}));
-      search.gain_nats.push_back(search.ladder.back().log_evidence - search.ladder[count - 1].log_evidence);
-    }
-    k = 0;
-  }
-  return search;
 }
 
 }  // namespace touchstone::diagnosis::boards

@@ -3,10 +3,31 @@
 
 #include <cmath>
 
+#include <Eigen/Geometry>
+
 #include "server/base/random.h"
-#include "server/diagnosis/boards/board_fit.h"
+#include "server/diagnosis/boards/board_pose.h"
+#include "server/diagnosis/boards/board_set.h"
+#include "server/diagnosis/boards/lens.h"
 
 namespace touchstone::diagnosis::boards {
+
+// What a lens differs from the nominal one by; zero: the nominal lens.
+enum LensEntry { kFocal, kOffsetX, kOffsetY, kK1, kK2, kP1, kP2, kK3, kAspect, kLensEntries };
+using LensVector = Eigen::Matrix<double, kLensEntries, 1>;
+
+inline session::CameraIntrinsics CameraWith(session::CameraIntrinsics nominal, const LensVector& lens) {
+  nominal.fx_px *= (1 + lens[kFocal]) * (1 + lens[kAspect]);
+  nominal.fy_px *= 1 + lens[kFocal];
+  nominal.cx_px += lens[kOffsetX], nominal.cy_px += lens[kOffsetY];
+  nominal.k1 += lens[kK1], nominal.k2 += lens[kK2], nominal.k3 += lens[kK3];
+  nominal.p1 += lens[kP1], nominal.p2 += lens[kP2];
+  return nominal;
+}
+
+inline image::PhotoLens PhotoLensOf(const session::CameraIntrinsics& camera) {
+  return LensOfModel(camera, model::NominalModel());
+}
 
 inline BoardSet MakeBoardSet(const LensVector& lens, int pictures, double sigma_px, uint64_t seed) {
   BoardSet set;
@@ -28,7 +49,9 @@ inline BoardSet MakeBoardSet(const LensVector& lens, int pictures, double sigma_
     bool inside = true;
     for (int corner = 0; corner < set.board.corners(); ++corner) {
       ProjectedCorner projected;
-      inside = inside && ProjectCorner(set.camera, lens, pose, set.board.CornerM(corner), &projected) &&
+      inside = inside &&
+               ProjectCorner(PhotoLensOf(CameraWith(set.camera, lens)), pose, set.board.CornerM(corner),
+                             &projected) &&
                projected.px.minCoeff() > 0 && projected.px.x() < 640 && projected.px.y() < 480;
       picture.corners_px.push_back(projected.px +
                                    sigma_px * Eigen::Vector2d(random.Normal(), random.Normal()));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "server/diagnosis/engine/held_out.h"
@@ -193,6 +194,65 @@ TEST_F(FitTest, RefittedHeldOutErrorEndsWhenItIsCancelled) {
   const Fit fit = *FitModel(experiment, Free({"object_push"}));
   experiment.cancelled = [] { return true; };
   EXPECT_EQ(HeldOutRmseRefitted(experiment, fit).status().code(), absl::StatusCode::kCancelled);
+}
+
+TEST_F(FitTest, HeldOutSquaresOfPartsSumToTheHeldOutErrorAndFitsMadeAnewAgree) {
+  rows.measured += kPushM * rows.columns["object_push"];
+  const Fit fit = *FitModel(experiment, Free({"object_push"}));
+  const std::vector<double> squares = HeldOutSquares(experiment, fit);
+  const std::vector<double> anew = *HeldOutSquaresRefitted(experiment, fit);
+  ASSERT_EQ(squares.size(), 4u);  // groups
+  ASSERT_EQ(anew.size(), 4u);
+  double sum = 0;
+  for (int part = 0; part < 4; ++part) {
+    sum += squares[part];
+    EXPECT_NEAR(squares[part], anew[part], 1e-3 * anew[part]);
+  }
+  EXPECT_NEAR(std::sqrt(sum / rows.rows()), HeldOutRmse(experiment, fit), 1e-12);
+}
+
+// Rows whose error the model itself tells where a fit did not see them.
+class JudgesItself : public LinearTestModel {
+ public:
+  using LinearTestModel::LinearTestModel;
+  std::optional<double> SquaresOfUnseen(const model::Model& model,
+                                        const std::vector<int>& unseen) const override {
+    return model.effects[0].values[0] * static_cast<double>(unseen.size());
+  }
+};
+
+TEST(HeldOut, SquaresAreThoseThatRowsWithValuesOfTheirOwnTell) {
+  JudgesItself rows(4, 5, 2);
+  rows.columns["object_push"] = rows.Random(1, kColumn);
+  rows.measured = kPushM * rows.columns["object_push"];
+  const Likelihood likelihood(rows.GroupRows(), nullptr, 0, nullptr);
+  Experiment experiment;
+  experiment.observations = &rows;
+  experiment.likelihood = &likelihood;
+  Parameterization model(model::NominalModel(), rows.groups());
+  model.Add(effects::Catalogue().Find("object_push"), false);
+  const Fit fit = *FitModel(experiment, model);
+  const std::vector<double> linear = HeldOutSquares(experiment, fit);
+  const std::vector<double> anew = *HeldOutSquaresRefitted(experiment, fit);
+  for (int part = 0; part < 4; ++part) {
+    EXPECT_NEAR(linear[part], 10 * kPushM, 1e-7);
+    EXPECT_NEAR(anew[part], 10 * kPushM, 1e-7);
+  }
+}
+
+TEST(HeldOut, FallIsTheMeanLogarithmOverPartsWithItsStandardError) {
+  const HeldOutFall fall = FallOfHeldOut({std::exp(1.0), std::exp(3.0)}, {1, 1}, 0);
+  EXPECT_NEAR(fall.mean, 2, 1e-12);
+  EXPECT_NEAR(fall.std_error, 1, 1e-12);
+  EXPECT_EQ(FallOfHeldOut({0, 0}, {0, 0}, 1e-9).mean, 0);
+}
+
+TEST(Likelihood, ValuesThatPredictionsFitAreNoDegreesOfFreedomOfTheNoise) {
+  Likelihood likelihood({0, 100}, nullptr, 0, nullptr);
+  likelihood.SetEliminated(20);
+  EXPECT_NEAR(likelihood.Sigma(4 * 80, 0), 2, 1e-12);
+  EXPECT_NEAR(likelihood.Sigma(4 * 70, 10), 2, 1e-12);
+  EXPECT_NEAR(likelihood.LogLikelihood(4 * 80, 0), -40 * std::log(4.0), 1e-12);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "server/base/decompositions.h"
 #include "server/base/status.h"
@@ -165,14 +166,12 @@ Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& inner, const Eigen::VectorXd&
   return step;
 }
 
-// One linear step from the whole fit for each part that is left out.
-double LinearHeldOut(const Folds& folds, const Fit& fit) {
+// One linear step from the whole fit for each part that is left out: its sums of squares.
+std::vector<double> LinearHeldOut(const Experiment& experiment, const Folds& folds, const Fit& fit) {
   const Eigen::MatrixXd& columns = fit.columns.values;
   const int n = static_cast<int>(columns.rows()), p = fit.model.size();
-  if (n == 0) return 0;
+  if (n == 0) return {};
   const Eigen::VectorXd r = columns.col(0);
-  if (p == 0) return std::sqrt(r.squaredNorm() / n);
-
   const Eigen::MatrixXd j = columns.rightCols(p);
   Eigen::MatrixXd all = j.transpose() * j;
   const Eigen::VectorXd target = j.transpose() * r;
@@ -181,27 +180,75 @@ double LinearHeldOut(const Folds& folds, const Fit& fit) {
     const double scale = fit.model.parameters()[i].scale;
     all(i, i) += variance / (scale * scale);  // what the other rows leave open stays where it is
   }
-  double sum = 0;
+  std::vector<double> squares;
   for (const std::vector<int>& fold : folds) {
     if (fold.empty()) continue;
     Eigen::MatrixXd jf(fold.size(), p);
     Eigen::VectorXd rf(fold.size());
     for (size_t k = 0; k < fold.size(); ++k) jf.row(k) = j.row(fold[k]), rf[k] = r[fold[k]];
     const Eigen::VectorXd step = BoundedStep(all - jf.transpose() * jf, target - jf.transpose() * rf, fit);
-    sum += (rf - jf * step).squaredNorm();
+    const std::optional<double> own =
+        experiment.observations->SquaresOfUnseen(fit.model.At(fit.point + step), fold);
+    squares.push_back(own.has_value() ? *own : (rf - jf * step).squaredNorm());
   }
-  return std::sqrt(sum / n);
+  return squares;
+}
+
+// The sum of squares of the rows that a fit did not see.
+double UnseenSquares(const ObservationModel& observations, const RefitWithoutPart& refit) {
+  const std::optional<double> own = observations.SquaresOfUnseen(refit.fit.model.base(), refit.rows);
+  if (own.has_value()) return *own;
+  const Eigen::VectorXd residual = observations.Residual(refit.fit.predicted);
+  double sum = 0;
+  for (const int row : refit.rows) sum += residual[row] * residual[row];
+  return sum;
+}
+
+// By group; by block where that cannot be.
+Folds GroupOrBlockFolds(const ObservationModel& observations, const Parameterization& model) {
+  Folds folds = GroupFolds(observations, model);
+  return folds.empty() ? BlockFolds(observations) : folds;
+}
+
+double RootMean(const std::vector<double>& squares, const Fit& fit) {
+  const double n = static_cast<double>(fit.columns.values.rows());
+  return n > 0 ? std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) / n) : 0;
 }
 
 }  // namespace
 
+std::vector<double> HeldOutSquares(const Experiment& experiment, const Fit& fit) {
+  return LinearHeldOut(experiment, GroupOrBlockFolds(*experiment.observations, fit.model), fit);
+}
+
+absl::StatusOr<std::vector<double>> HeldOutSquaresRefitted(const Experiment& experiment, const Fit& fit) {
+  if (fit.model.size() == 0) return HeldOutSquares(experiment, fit);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<RefitWithoutPart> refits,
+                              Refit(experiment, fit, GroupOrBlockFolds(*experiment.observations, fit.model)));
+  std::vector<double> squares;
+  for (const RefitWithoutPart& refit : refits)
+    squares.push_back(UnseenSquares(*experiment.observations, refit));
+  return squares;
+}
+
 double HeldOutRmse(const Experiment& experiment, const Fit& fit) {
-  const Folds folds = GroupFolds(*experiment.observations, fit.model);
-  return LinearHeldOut(folds.empty() ? BlockFolds(*experiment.observations) : folds, fit);
+  return RootMean(HeldOutSquares(experiment, fit), fit);
 }
 
 double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit) {
-  return LinearHeldOut(BlockFolds(*experiment.observations), fit);
+  return RootMean(LinearHeldOut(experiment, BlockFolds(*experiment.observations), fit), fit);
+}
+
+HeldOutFall FallOfHeldOut(const std::vector<double>& before, const std::vector<double>& after,
+                          double negligible) {
+  const double count = static_cast<double>(before.size());
+  double sum = 0, squares = 0;
+  for (size_t part = 0; part < before.size(); ++part) {
+    const double fall = std::log((before[part] + negligible) / (after[part] + negligible));
+    sum += fall, squares += fall * fall;
+  }
+  const double mean = sum / count;
+  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / (count - 1))};
 }
 
 absl::StatusOr<std::vector<std::vector<RefitWithoutPart>>> RefitWithoutParts(const Experiment& experiment,
@@ -231,10 +278,7 @@ absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const F
   double largest = 0;
   for (const std::vector<RefitWithoutPart>& refits : divisions) {
     double sum = 0;
-    for (const RefitWithoutPart& refit : refits) {
-      const Eigen::VectorXd residual = observations.Residual(refit.fit.predicted);
-      for (const int row : refit.rows) sum += residual[row] * residual[row];
-    }
+    for (const RefitWithoutPart& refit : refits) sum += UnseenSquares(observations, refit);
     largest = std::max(largest, sum);
   }
   return std::sqrt(largest / n);

@@ -14,8 +14,20 @@ namespace touchstone::diagnosis::engine {
 // groups are fewer than three or have values of their own. The other rows' columns give the values (one linear step
 // from the fit).
 double HeldOutRmse(const Experiment& experiment, const Fit& fit);
+// The sums of squares of which that is the root mean, part by part; and the same by fits that are made anew. Errors of
+// those: CANCELLED, or what the simulator says.
+std::vector<double> HeldOutSquares(const Experiment& experiment, const Fit& fit);
+absl::StatusOr<std::vector<double>> HeldOutSquaresRefitted(const Experiment& experiment, const Fit& fit);
 // By block in any case, so that fits with and without values of single groups compare.
 double HeldOutRmseByBlock(const Experiment& experiment, const Fit& fit);
+
+// By how much the logarithm of a part's squares falls from one fit to another: mean over the parts, and its standard
+// error. Squares below `negligible` count as that.
+struct HeldOutFall {
+  double mean = 0, std_error = 0;
+};
+HeldOutFall FallOfHeldOut(const std::vector<double>& before, const std::vector<double>& after,
+                          double negligible);
 
 // A fit that did not see these rows.
 struct RefitWithoutPart {

@@ -206,7 +206,7 @@ Eigen::VectorXd Likelihood::Norms(const Columns& columns, int s) const {
 }
 
 double Likelihood::LogLikelihood(double q, int s) const {
-  const double n = rows();
+  const double n = rows() - eliminated_;
   const double found = std::max(q, 0.0) / n + floor_ * floor_, least = least_sigma_ * least_sigma_;
   const double by_noise =
       found < least ? -0.5 * n * (std::log(least) + found / least - 1) : -0.5 * n * std::log(found);
@@ -214,8 +214,9 @@ double Likelihood::LogLikelihood(double q, int s) const {
 }
 
 double Likelihood::Sigma(double q, int parameters) const {
-  return std::max(std::sqrt(std::max(q, 0.0) / std::max(rows() - parameters, 1) + floor_ * floor_),
-                  least_sigma_);
+  return std::max(
+      std::sqrt(std::max(q, 0.0) / std::max(rows() - eliminated_ - parameters, 1) + floor_ * floor_),
+      least_sigma_);
 }
 
 double Likelihood::LogPrior(int s) const {

@@ -40,6 +40,10 @@ class Likelihood {
   // than the rows has measured it. Default 0: it is whatever they show.
   void SetLeastNoise(double sigma) { least_sigma_ = sigma; }
 
+  // So many degrees of freedom of the rows are taken by values that every prediction fits to them (the pose of each
+  // picture): the noise is judged by what is left. Default 0.
+  void SetEliminated(int values) { eliminated_ = values; }
+
   // The first is that there is no smooth error.
   const std::vector<SurfaceErrorHypothesis>& hypotheses() const { return hypotheses_; }
   int rows() const { return group_rows_.back(); }
@@ -65,7 +69,7 @@ class Likelihood {
   Eigen::MatrixXd Cross(const Columns& a, const Columns& b, int s) const;
   Eigen::VectorXd Norms(const Columns& columns, int s) const;
 
-  // -(N/2) log(Q/N + floor^2) - (1/2) log det, for a quadratic form Q; with noise of at least s, the same where Q/N is
+  // -(N/2) log(Q/N + floor^2) - (1/2) log det, for a quadratic form Q of N rows less those eliminated; with noise of at least s, the same where Q/N is
   // larger than s^2, else the normal density of noise s.
   double LogLikelihood(double q, int s) const;
   double Sigma(double q, int parameters) const;  // in the unit of the rows
@@ -90,6 +94,7 @@ class Likelihood {
   std::vector<int> group_rows_;
   double floor_;
   double least_sigma_ = 0;
+  int eliminated_ = 0;
   std::vector<Basis> bases_;
   std::vector<SurfaceErrorHypothesis> hypotheses_;
 };

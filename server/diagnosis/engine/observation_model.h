@@ -2,6 +2,7 @@
 // observations (touches/, later images/) implements this; see server/README.md.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,12 @@ class ObservationModel {
   virtual absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model&,
                                                           const std::vector<double>&) const {
     return Predict(moved);
+  }
+  // The sum of squares of rows under values that were found without them, where it is not that of these rows' residuals:
+  // a block with values of its own that every prediction fits to it (the pose of a picture) is no judge of the shared
+  // ones unless those are fitted to another part of it. Rows of whole blocks.
+  virtual std::optional<double> SquaresOfUnseen(const model::Model&, const std::vector<int>&) const {
+    return std::nullopt;
   }
   // How far a value moves for a derivative, over its parameter's scale.
   virtual double DerivativeStep() const { return 0.02; }

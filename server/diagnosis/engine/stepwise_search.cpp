@@ -17,6 +17,7 @@ constexpr double kNearPrediction = 40;  // nats: candidates this far behind the 
 constexpr double kPoorPrediction =
     0.5;  // ... or this share of the evidence behind the fit, for strong effects
 constexpr int kFormulaStarts = 8;
+constexpr double kNegligible = 1e-3;  // of a held-out part's squares, over the noise's square
 
 std::string InWords(const Extension& extension) {
   return extension.object.empty() ? extension.name : absl::StrCat(extension.name, " on ", extension.object);
@@ -37,7 +38,8 @@ bool HaveRowsForOwnValues(const ObservationModel& observations, const Parameteri
 
 }  // namespace
 
-bool StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensions, bool rare) const {
+absl::StatusOr<bool> StepwiseSearch::Accepts(const Fit& before, const Fit& after,
+                                             size_t extensions, bool rare) const {
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1) ||
       (rare && !HaveRowsForOwnValues(*experiment_.observations, after.model, rules_.min_rows_per_parameter)))
@@ -46,6 +48,15 @@ bool StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensi
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
+  if (rules_.min_cv_gain_std_errors > 0) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> had,
+                                HeldOutSquaresRefitted(experiment_, before));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> has,
+                                HeldOutSquaresRefitted(experiment_, after));
+    const HeldOutFall fall =
+        FallOfHeldOut(had, has, kNegligible * after.sigma * after.sigma);
+    if (!(fall.mean > rules_.min_cv_gain_std_errors * fall.std_error)) return false;
+  }
   // Values of single objects cannot be predicted from other objects.
   const auto unseen = rare ? HeldOutRmseByBlock : HeldOutRmse;
   const double had = unseen(experiment_, before), has = unseen(experiment_, after);
@@ -115,9 +126,11 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
     best = std::move(fit);
     best_is_rare = extension.rare;
   }
-  if (!best.ok() ||
-      !Accepts(explanation->fit, *best, best_is_rare ? rare : extensions.size() - rare, best_is_rare))
-    return false;
+  if (!best.ok()) return false;
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const bool accepted,
+      Accepts(explanation->fit, *best, best_is_rare ? rare : extensions.size() - rare, best_is_rare));
+  if (!accepted) return false;
   explanation->fit = *std::move(best);
   return true;
 }

@@ -23,6 +23,8 @@ struct SearchRules {
   // ... its square by that share of the noise's square, not of its own: where a smooth error of the surface may hold
   // most of the error that a later step explains, and the first step's share of that is nothing.
   bool cv_gain_over_noise = false;
+  // ... and the logarithm of a part's held-out error, of its mean over parts; 0: parts are not compared one by one.
+  double min_cv_gain_std_errors = 0;
   double equivalent_nats = 3;           // explanations as near as this are named together
   double complexity_penalty_nats = 11;  // of a formula term that was picked from a dictionary
   int min_rows_per_parameter = 8;       // that each fitted value needs
@@ -99,7 +101,8 @@ class StepwiseSearch {
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
   absl::Status Improve(Explanation* explanation) const;  // swaps and removals, as long as there are any
-  bool Accepts(const Fit& before, const Fit& after, size_t extensions, bool rare) const;
+  absl::StatusOr<bool> Accepts(const Fit& before, const Fit& after, size_t extensions,
+                               bool rare) const;
   double EnterNats(bool rare) const { return rare ? rules_.enter_rare_nats : rules_.enter_nats; }
 
   const Experiment& experiment_;

@@ -6,30 +6,14 @@
 
 #include <cmath>
 
+#include "server/diagnosis/report/from_engine.h"
+
 namespace touchstone::diagnosis::report {
 namespace {
 
-Quality QualityOf(const boards::BoardQuality& quality) {
-  return {quality.rmse_px, quality.heldout_rmse_px, quality.lack_of_fit_p};
-}
-
-std::string ErrorWords(const boards::BoardQuality& quality) {
-  return absl::StrFormat("reprojection error %.4f px, %.4f px on left-out pictures", quality.rmse_px,
-                         quality.heldout_rmse_px);
-}
-
-Step BoardStepOf(const boards::BoardStep& from) {
-  Step step;
-  step.effect = from.effect;
-  step.equivalent = from.equivalent;
-  step.probability = from.probability;
-  step.gain_nats = from.gain_nats;
-  step.parameters = from.parameters;
-  step.meaning = from.meaning;
-  step.check_on_rig = from.check_on_rig;
-  step.remedy = from.remedy;
-  step.words = ErrorWords(from.quality);
-  return step;
+std::string ErrorWords(const Quality& quality) {
+  return absl::StrFormat("reprojection error %.4f px, %.4f px on left-out pictures", quality.rmse,
+                         quality.heldout_rmse);
 }
 
 Unexplained RestOf(const std::vector<boards::BoardRest>& rests) {
@@ -38,8 +22,8 @@ Unexplained RestOf(const std::vector<boards::BoardRest>& rests) {
   for (const boards::BoardRest& rest : rests)
     words.push_back(absl::StrCat(rest.name, ": ", ErrorWords(rest.quality)));
   unexplained.words = absl::StrJoin(words, "; ");
-  unexplained.rmse = rests.back().quality.rmse_px;
-  unexplained.heldout_rmse = rests.back().quality.heldout_rmse_px;
+  unexplained.rmse = rests.back().quality.rmse;
+  unexplained.heldout_rmse = rests.back().quality.heldout_rmse;
   return unexplained;
 }
 
@@ -54,12 +38,12 @@ DataReport DataOf(const boards::BoardDiagnosis& found, const boards::BoardSet& s
   if (!set.without_board.empty())
     data.set_aside.rows.push_back(
         {"the whole board is not in the picture", static_cast<int>(set.without_board.size()), {}});
-  if (found.initial) data.initial = QualityOf(*found.initial);
-  if (found.final) data.final = QualityOf(*found.final);
-  if (found.noise.sigma_px > 0) {
+  if (found.initial) data.initial = *found.initial;
+  if (found.final) data.final = *found.final;
+  if (found.noise.sigma > 0) {
     data.noise_floor.emplace();
     // Of a corner, as the errors are: two coordinates.
-    data.noise_floor->sigma = std::sqrt(2.0) * found.noise.sigma_px;
+    data.noise_floor->sigma = std::sqrt(2.0) * found.noise.sigma;
     data.noise_floor->degrees_of_freedom = found.noise.degrees_of_freedom;
   }
   if (data.noise_floor && data.initial)
@@ -76,10 +60,13 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
   diagnosis.model_name = found.model_name;
   diagnosis.model_hash = found.model_hash;
   diagnosis.data = {DataOf(found, set)};
-  for (const boards::BoardStep& step : found.steps) {
-    diagnosis.steps.push_back(BoardStepOf(step));
-    diagnosis.data[0].after_step.push_back(QualityOf(step.quality));
+  for (const engine::LadderStep& from : found.steps) {
+    Step step = StepOf(from);
+    step.words = absl::StrCat(ErrorWords(from.quality), step.words.empty() ? "" : "; ", step.words);
+    diagnosis.steps.push_back(std::move(step));
+    diagnosis.data[0].after_step.push_back(from.quality);
   }
+  diagnosis.confounded = found.confounded;
   diagnosis.improved_model = found.improved_model;
   diagnosis.summary = found.summary;
   diagnosis.warnings = found.warnings;

@@ -127,10 +127,10 @@ TEST(FromBoards, GivesPixelsAndWhatIsLeftWithItsError) {
   boards::BoardDiagnosis found;
   found.verdict = engine::Verdict::kUnexplained;
   found.pictures = 20;
-  found.initial = boards::BoardQuality{1.2, 1.3, 1e-9};
-  found.final = boards::BoardQuality{0.4, 0.5, 0.01};
+  found.initial = engine::Quality{1.2, 1.3, 1e-9};
+  found.final = engine::Quality{0.4, 0.5, 0.01};
   found.noise.sigma_px = 0.1;
-  boards::BoardStep step;
+  engine::LadderStep step;
   step.effect = "radial_distortion";
   step.quality = *found.final;
   found.steps = {step};
