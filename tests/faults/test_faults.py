@@ -64,6 +64,12 @@ def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
     passes(failing_files.run((name,) if name else (), faults))
 
 
+def test_libraries_without_memory_do_not_hang_a_program():
+    result = programs.Result()
+    result.seen.append(little_memory.run_starts((260, 350), result))
+    passes(result)
+
+
 @pytest.mark.second_tier("repeated: the same commands with less memory each time")
 def test_a_program_without_memory_says_so_and_leaves_whole_files_or_none():
     passes(little_memory.run())
