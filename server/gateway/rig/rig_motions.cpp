@@ -63,7 +63,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
     return parts_.arm->Ready();
   audit().Write("power_on", {{"robot_mode", arm::RobotModeName(state.robot_mode)}}).IgnoreError();
   // An arm that is told to release its brakes does so by itself, whatever becomes of this process.
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, "0 powering the arm on"));
+  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kMotionKey, "0 powering the arm on"}}, false));
   powering_ = true;
   absl::Status status = parts_.arm->PowerOn(guard);
   // The states report it a little later than the dashboard.
@@ -189,8 +189,8 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
                               const source::MotionGuard& guard) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
-  TOUCHSTONE_RETURN_IF_ERROR(
-      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
+  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts(
+      {{kMotionKey, absl::StrCat(program_id, " a motion without a touch")}}, false));
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
   Program program{program_id, guard, parts_.planner->limits().max_force_n};

@@ -75,7 +75,11 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
     std::lock_guard<std::mutex> lock(stop_mutex_);
     if (stops_ != stops) return absl::AbortedError("the rig was stopped again meanwhile: the stop holds");
     // On the disk before anything may move.
-    TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kStopKey, ""}}, false));
+    if (const absl::Status written = unwritten_.SetFacts({{kStopKey, ""}}, false); !written.ok()) {
+      // It may have reached the disk although it says that it did not.
+      unwritten_.SetFacts({{kStopKey, stop_reason_}}, true).IgnoreError();
+      return written;
+    }
     stop_reason_.clear();
     stopped_ = false;
   }
