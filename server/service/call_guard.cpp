@@ -21,7 +21,7 @@ source::MotionGuard TimeGuardOf(const ServerOptions& options, bool moves) {
           begin = options.clock->Now()]() -> absl::Status {
     const double s = clock->SecondsSince(begin);
     return moves || s <= max_s ? absl::OkStatus()
-                               : OverLimit("the call is not done after seconds:", s, "max_unary_s", max_s);
+                               : OverLimit("the call is not done after seconds:", LimitInWords(s), "max_unary_s", max_s);
   };
 }
 

@@ -76,8 +76,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   if (status.ok()) zeroed_n_.setZero();
   if (!status.ok()) {
     if (!parts_.arm->State().ok())
-      Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(),
-                         ")"));
+      LatchLoss(absl::StrCat("while it was powered on: ", status.message()));
     // What was taken back is not taken for somebody else's doing.
     const auto off = [this] {
       const absl::StatusOr<arm::ArmState> now = parts_.arm->State();

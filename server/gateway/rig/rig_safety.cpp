@@ -60,6 +60,10 @@ void Rig::Latch(const std::string& what) {
   spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);
 }
 
+void Rig::LatchLoss(const std::string& what) {
+  Latch(absl::StrCat("by the loss of the arm's controller (", what, ")"));
+}
+
 void Rig::LookAtSafety(bool asked) {
   std::lock_guard<std::mutex> lock(safety_mutex_);
   for (const std::string& what : watch_.Look(*parts_.arm, {motions_ > 0, powering_, asked})) {
