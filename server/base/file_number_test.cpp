@@ -18,7 +18,7 @@ TEST(FileNumber, IsTheNumberThatWasSent) {
   }
   EXPECT_EQ(FileNumber(Unit::kMillimetre, NAN), "nan");
   EXPECT_EQ(FileNumber(Unit::kMillimetre, -INFINITY), "-inf");
-  EXPECT_EQ(VectorText(Eigen::Vector3d(0.0123, 0, -0.0301), Unit::kMillimetre), "(12.3, 0, -30.1)");
+  EXPECT_EQ(VectorText(1e-3 * Eigen::Vector3d(12.3, 0, -30.1), Unit::kMillimetre), "(12.3, 0, -30.1)");
 }
 
 TEST(FileNumber, OfAVectorThatIsRefusedIsTheOneThatWasSent) {

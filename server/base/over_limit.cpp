@@ -16,8 +16,8 @@ std::string LimitInWords(double value) {
 
 absl::Status OverLimit(absl::string_view asked, const absl::AlphaNum& value, absl::string_view limit_name,
                        double limit) {
-  return absl::ResourceExhaustedError(absl::StrCat(asked, " ", value, ": at most ",
-                                                   LimitInWords(limit), " (", limit_name, ")"));
+  return absl::ResourceExhaustedError(
+      absl::StrCat(asked, " ", value, ": at most ", LimitInWords(limit), " (", limit_name, ")"));
 }
 
 absl::Status Busy(absl::string_view what, absl::string_view limit_name, double limit) {

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/file_number.h"
 #include "server/base/nan.h"
 #include "server/base/over_limit.h"
-#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"

@@ -185,7 +185,8 @@ absl::Status SqliteFile::Error(int result) const {
     case SQLITE_PERM:
     case SQLITE_AUTH:
       return absl::PermissionDeniedError(
-          message("may not be written", "change the permissions of file and folder, check its disk, or copy it elsewhere"));
+          message("may not be written",
+                  "change the permissions of file and folder, check its disk, or copy it elsewhere"));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return absl::UnavailableError(message("is in use by another program", "end that program or wait"));

@@ -15,7 +15,8 @@ namespace {
 
 absl::Status NotUnit(const Eigen::Vector3d& vector, const std::string& field) {
   if (!vector.allFinite())
-    return absl::InvalidArgumentError(absl::StrCat(field, " = ", VectorText(vector), ": must be finite numbers"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(field, " = ", VectorText(vector), ": must be finite numbers"));
   return absl::InvalidArgumentError(absl::StrCat(field, " = ", VectorText(vector), " has length ",
                                                  ShortestNumber(vector.norm()),
                                                  ": must be a unit vector (within 0.001)"));

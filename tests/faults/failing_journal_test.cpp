@@ -64,7 +64,10 @@ const std::vector<Step>& Steps() {
        [](Journal* j) {
          return j->SetMetadata({{"stop", "by ana"}, {"motion_under_way", ""}});
        }},
-      {"SetSessionClock", [](Journal* j) { return j->SetSessionClock("s", {"boot", 4.5}); }},
+      {"SetSessionClock",
+       [](Journal* j) {
+         return j->SetSessionClock("s", {"boot", 4.5});
+       }},
       {"AddImage", [](Journal* j) { return j->AddImage("s", Picture()); }},
       {"AddFinished", [](Journal* j) { return j->AddFinished("s", MadeElsewhere()); }},
       {"Failed again", [](Journal* j) { return j->Failed("s", "b", "once more"); }},
@@ -81,23 +84,21 @@ std::string TextOf(const Journal& journal) {
     const auto clock = journal.SessionClock(session.name);
     absl::StrAppend(&text, "session ", session.name, " ", session.touches, " ", session.done, " ",
                     session.failed, " ", clock.ok() ? clock->boot_id : clock.status().ToString(), "\n");
-    const absl::Status touches =
-        journal.ForEachTouch(session.name, [&](const session::JournalTouch& touch) {
-          const auto series = journal.Series(session.name, touch.id);
-          absl::StrAppend(&text, touch.id, " ", static_cast<int>(touch.stage), " ", touch.attempt, " ",
-                          touch.program_id, " ", touch.error, " ",
-                          touch.result.fingers.empty() ? 0 : touch.result.fingers[0].contact_time_s, " ",
-                          !series.ok()          ? series.status().ToString()
-                          : series->has_value() ? Sha256Hex((*series)->columns)
-                                                : "",
-                          "\n");
-          return true;
-        });
-    const absl::Status images =
-        journal.ForEachImage(session.name, [&](const session::JournalImage& image) {
-          absl::StrAppend(&text, "picture ", image.id, " ", Sha256Hex(image.png), "\n");
-          return true;
-        });
+    const absl::Status touches = journal.ForEachTouch(session.name, [&](const session::JournalTouch& touch) {
+      const auto series = journal.Series(session.name, touch.id);
+      absl::StrAppend(&text, touch.id, " ", static_cast<int>(touch.stage), " ", touch.attempt, " ",
+                      touch.program_id, " ", touch.error, " ",
+                      touch.result.fingers.empty() ? 0 : touch.result.fingers[0].contact_time_s, " ",
+                      !series.ok()          ? series.status().ToString()
+                      : series->has_value() ? Sha256Hex((*series)->columns)
+                                            : "",
+                      "\n");
+      return true;
+    });
+    const absl::Status images = journal.ForEachImage(session.name, [&](const session::JournalImage& image) {
+      absl::StrAppend(&text, "picture ", image.id, " ", Sha256Hex(image.png), "\n");
+      return true;
+    });
     if (!touches.ok() || !images.ok()) absl::StrAppend(&text, touches.ToString(), images.ToString());
   }
   const auto deleted = journal.DeletedSessions();
@@ -113,8 +114,7 @@ absl::StatusOr<std::unique_ptr<Journal>> Open(const std::string& path) {
 class FailingJournals : public FailingFiles {
  protected:
   FailingJournals() {
-    void* shared =
-        mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void* shared = mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     acknowledged_ = new (shared) std::atomic<int>(0);
     const auto journal = Open(Path()).value();
     texts_.push_back(TextOf(*journal));

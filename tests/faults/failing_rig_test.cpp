@@ -41,8 +41,7 @@ struct Seen {
 class FailingRigs : public FailingFiles {
  protected:
   FailingRigs() {
-    void* shared =
-        mmap(nullptr, sizeof(Seen), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void* shared = mmap(nullptr, sizeof(Seen), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     seen_ = new (shared) Seen{};
   }
   ~FailingRigs() override { munmap(seen_, sizeof(Seen)); }
@@ -84,6 +83,7 @@ class FailingRigs : public FailingFiles {
     const int programs = arm_->programs;
     seen_->refuses = absl::IsAborted(rig_->Home(Allowed)) && arm_->programs == programs;
   }
+
  public:
   // --- What happens to a rig, each in a process of its own
 
@@ -93,9 +93,8 @@ class FailingRigs : public FailingFiles {
   }
   void BePausedInAMotion() {
     BreakAMotionOff([&] {
-      arm_->Change([](gateway::arm::ArmState* state) {
-        state->runtime_state = gateway::arm::RuntimeState::kPausing;
-      });
+      arm_->Change(
+          [](gateway::arm::ArmState* state) { state->runtime_state = gateway::arm::RuntimeState::kPausing; });
     });
   }
   void LoseTheLinkInAMotion() {
@@ -111,9 +110,7 @@ class FailingRigs : public FailingFiles {
  protected:
   void BreakAMotionOff(const std::function<void()>& how) {
     auto homing = std::async(std::launch::async, [&] { return rig_->Home(Allowed); });
-    const auto ended = [&] {
-      return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    };
+    const auto ended = [&] { return homing.wait_for(std::chrono::seconds(0)) == std::future_status::ready; };
     WaitFor([&] { return arm_->motions == 1 || ended(); });
     if (arm_->motions == 0) return;
     seen_->moved = true;

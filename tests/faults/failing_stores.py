@@ -12,8 +12,20 @@ import grpc
 
 import kill_gateway
 from failing_files import FAULTS, FailingDisk, Fault
-from programs import (PATIENCE_S, Result, Server, create_model, create_session, emulated_rig, export_session, list_models, list_sessions,
-                      measurements, model_yaml, scratch)
+from programs import (
+    PATIENCE_S,
+    Result,
+    Server,
+    create_model,
+    create_session,
+    emulated_rig,
+    export_session,
+    list_models,
+    list_sessions,
+    measurements,
+    model_yaml,
+    scratch,
+)
 from touchstone.v1 import control_pb2, sessions_pb2
 
 LIVING = tuple(fault for fault in FAULTS if not fault.kills)
@@ -25,8 +37,9 @@ def _says_why(error: grpc.RpcError, fault: Fault, folder: str) -> str:
     """What is wrong with an error; empty: nothing."""
     if error.code() not in CODES:
         return f"{error.code().name}: {error.details()}"
-    named = folder in error.details() and (os.strerror(fault.error) in error.details() or "full" in error.details())
-    return "" if named else f"it does not name the file and why: {error.details()}"
+    details = error.details() or ""
+    named = folder in details and (os.strerror(fault.error) in details or "full" in details)
+    return "" if named else f"it does not name the file and why: {details}"
 
 
 def delete_session(channel: grpc.Channel, name: str) -> None:
@@ -115,7 +128,7 @@ def run_gateway(faults: tuple[Fault, ...], stride: int, result: Result) -> str:
                         try:
                             answers[number] = client.touch(number)
                         except grpc.RpcError as error:
-                            made = "was made, but its result" in error.details()
+                            made = "was made, but its result" in (error.details() or "")
                             wrong = _says_why(error, fault, str(folder))
                             result.expect(not wrong, f"{where} ({disk.plan.failed.decode()}): {wrong}")
                             result.expect(not fault.passes, f"{where}: it is refused: {error.details()}")

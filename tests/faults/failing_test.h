@@ -30,10 +30,10 @@ struct Fault {
   int error;
 };
 inline constexpr Fault kFaults[] = {{"fails once", FailureMode::kOnce, EIO},
-                             {"full from then on", FailureMode::kFromThenOn, ENOSPC},
-                             {"interrupted", FailureMode::kOnce, EINTR},
-                             {"short", FailureMode::kShort, 0},
-                             {"killed", FailureMode::kKill, 0}};
+                                    {"full from then on", FailureMode::kFromThenOn, ENOSPC},
+                                    {"interrupted", FailureMode::kOnce, EINTR},
+                                    {"short", FailureMode::kShort, 0},
+                                    {"killed", FailureMode::kKill, 0}};
 inline constexpr int kMaxCalls = 5000;
 
 // What stands in the folder, file by file; of a journal what its sessions export.
@@ -139,7 +139,8 @@ class FailingFiles : public ::testing::Test {
   const std::string& out() const { return out_.path(); }
 
   void Clear() {
-    for (const auto& entry : std::filesystem::directory_iterator(out())) std::filesystem::remove_all(entry.path());
+    for (const auto& entry : std::filesystem::directory_iterator(out()))
+      std::filesystem::remove_all(entry.path());
   }
 
   void Set(const Fault& fault, int call) {

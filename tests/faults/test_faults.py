@@ -73,7 +73,7 @@ def test_libraries_without_memory_do_not_hang_a_program():
 
 def test_a_server_whose_disk_fails_keeps_what_it_acknowledged():
     result = programs.Result()
-    result.seen.append(failing_stores.run_server(failing_stores.LIVING[:2], 4, result))
+    result.seen.append(failing_stores.run_server(failing_stores.LIVING[:2], 9, result))
     passes(result)
 
 

@@ -12,7 +12,8 @@ TURNED, SHOWN = "left \u202ethgir\x1b[31m", r"left \xe2\x80\xaethgir\x1b[31m"
 
 
 @pytest.mark.parametrize("text, shown", [
-    (TURNED, SHOWN), ("Jürgen 木 ok", "Jürgen 木 ok"), ("two\nlines", "two\nlines"), ("a\rb\x00", r"a\x0db\x00"), ("\u2028\u200b\x9b", r"\xe2\x80\xa8\xe2\x80\x8b\xc2\x9b"),
+    (TURNED, SHOWN), ("Jürgen 木 ok", "Jürgen 木 ok"), ("two\nlines", "two\nlines"), ("a\rb\x00", r"a\x0db\x00"),
+    ("\u2028\u200b\x9b", r"\xe2\x80\xa8\xe2\x80\x8b\xc2\x9b"),
     ("\udc80", r"\xed\xb2\x80")])
 def test_what_turns_hides_or_ends_a_line_is_escaped(text, shown):
     assert printable(text) == shown

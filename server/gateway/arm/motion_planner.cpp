@@ -93,10 +93,10 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, calibration:
     return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
   const auto mm = [](double metres) { return FileNumber(Unit::kMillimetre, metres); };
   if (!(touch.speed_m_s >= limits_.min_speed_m_s) || touch.speed_m_s > limits_.max_speed_m_s)
-    return absl::OutOfRangeError(absl::StrCat(
-        "speed ", FileNumber(Unit::kMillimetrePerSecond, touch.speed_m_s), " mm/s: must be from ",
-        FileNumber(Unit::kMillimetrePerSecond, limits_.min_speed_m_s), " to ",
-        FileNumber(Unit::kMillimetrePerSecond, limits_.max_speed_m_s), " mm/s"));
+    return absl::OutOfRangeError(
+        absl::StrCat("speed ", FileNumber(Unit::kMillimetrePerSecond, touch.speed_m_s),
+                     " mm/s: must be from ", FileNumber(Unit::kMillimetrePerSecond, limits_.min_speed_m_s),
+                     " to ", FileNumber(Unit::kMillimetrePerSecond, limits_.max_speed_m_s), " mm/s"));
   if (!(touch.standoff_m >= kMinStandoffM) || touch.standoff_m > limits_.max_standoff_m)
     return absl::OutOfRangeError(absl::StrCat("standoff ", mm(touch.standoff_m), " mm: must be from ",
                                               mm(kMinStandoffM), " to ", mm(limits_.max_standoff_m), " mm"));

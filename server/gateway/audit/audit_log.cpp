@@ -121,7 +121,8 @@ absl::StatusOr<std::unique_ptr<AuditLog>> AuditLog::Open(const std::string& path
   auto log = std::make_unique<FileAuditLog>(path, descriptor);
   TOUCHSTONE_RETURN_IF_ERROR(log->CheckLastLine());
   if (const absl::Status synced = SyncFolderOf(path); !synced.ok())
-    return absl::UnavailableError(absl::StrCat("audit log ", path, ": ", synced.message(), "; check its disk"));
+    return absl::UnavailableError(
+        absl::StrCat("audit log ", path, ": ", synced.message(), "; check its disk"));
   return log;
 }
 

@@ -20,8 +20,8 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
   TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
-  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts(
-      {{kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")}}, false));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      unwritten_.SetFacts({{kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")}}, false));
   audit().Write("freedrive", {{"program", std::to_string(program_id)}}).IgnoreError();
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());

@@ -9,8 +9,8 @@
 
 #include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
-#include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/idle_effector.h"
+#include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/scripted_arm.h"
 
 namespace touchstone::gateway {

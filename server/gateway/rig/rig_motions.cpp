@@ -75,8 +75,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   if (status.ok()) status = parts_.arm->Ready();
   if (status.ok()) zeroed_n_.setZero();
   if (!status.ok()) {
-    if (!parts_.arm->State().ok())
-      LatchLoss(absl::StrCat("while it was powered on: ", status.message()));
+    if (!parts_.arm->State().ok()) LatchLoss(absl::StrCat("while it was powered on: ", status.message()));
     // What was taken back is not taken for somebody else's doing.
     const auto off = [this] {
       const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
@@ -188,8 +187,8 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const std::vector<std::array<double, 6>>& joints, double duration_s,
                               const source::MotionGuard& guard) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
-  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts(
-      {{kMotionKey, absl::StrCat(program_id, " a motion without a touch")}}, false));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      unwritten_.SetFacts({{kMotionKey, absl::StrCat(program_id, " a motion without a touch")}}, false));
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
   Program program{program_id, guard, parts_.planner->limits().max_force_n};

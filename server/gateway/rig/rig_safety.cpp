@@ -18,9 +18,10 @@ namespace touchstone::gateway {
 namespace {
 
 constexpr double kSafetyLookS = 0.02;  // host time between two looks; no state in between is missed
-constexpr double kWriteAgainS = 0.5;  // host time between two tries to write what the journal's disk did not take
-constexpr double kArmAnswersS = 10;    // host time that the arm gets at the start
-constexpr double kProgramEndsS = 5;    // host time that a program gets to end after a stop
+constexpr double kWriteAgainS =
+    0.5;  // host time between two tries to write what the journal's disk did not take
+constexpr double kArmAnswersS = 10;  // host time that the arm gets at the start
+constexpr double kProgramEndsS = 5;  // host time that a program gets to end after a stop
 constexpr size_t kMaxReasonBytes = 1000;
 
 std::string UtcNow() {

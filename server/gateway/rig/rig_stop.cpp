@@ -80,7 +80,8 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
       // It may have reached the disk although it says that it did not. SQLite would not write the same text over it.
       if (absl::EndsWith(stop_reason_, not_released_))
         stop_reason_.resize(stop_reason_.size() - not_released_.size());
-      not_released_ = absl::StrCat("; not released at try ", ++failed_releases_, " (the journal's disk failed)");
+      not_released_ =
+          absl::StrCat("; not released at try ", ++failed_releases_, " (the journal's disk failed)");
       stop_reason_ += not_released_;
       unwritten_.SetFacts({{kStopKey, stop_reason_}}, true).IgnoreError();
       return written;

@@ -11,8 +11,8 @@ namespace {
 // Whether the journal refused the step itself, so that trying again cannot help: everything else is a disk that is full or
 // fails, or another program's lock.
 bool IsWrong(const absl::Status& status) {
-  return absl::IsNotFound(status) || absl::IsFailedPrecondition(status) ||
-         absl::IsInvalidArgument(status) || absl::IsAlreadyExists(status);
+  return absl::IsNotFound(status) || absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
+         absl::IsAlreadyExists(status);
 }
 
 absl::Status Waiting(absl::string_view id, bool made, absl::string_view why) {
