@@ -162,8 +162,8 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
 
 absl::Status RunStatus(const Cli& cli, const StatusOptions& options) {
   if (!(options.every_s > 0) || options.every_s > 3600)
-    return absl::InvalidArgumentError(
-        absl::StrCat("--every-s: ", Rounded(options.every_s), " is out of range; above 0, at most 3600"));
+    return absl::InvalidArgumentError(absl::StrCat("--every-s: ", ShortestNumber(options.every_s),
+                                                   " is out of range; above 0, at most 3600"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   while (true) {
     TOUCHSTONE_RETURN_IF_ERROR(PrintState(cli, rig.connection.get()));

@@ -36,11 +36,23 @@ class CgroupMemory : public testing::Test {
   TestFolder root_;
 };
 
-TEST_F(CgroupMemory, OfASystemdServiceIsItsMemoryMax) {
-  Process("0::/system.slice/touchstone-server.service\n", kV2Mount);
-  Limit("/sys/fs/cgroup/system.slice/touchstone-server.service/memory.max", 600 * kMib);
-  Write("/sys/fs/cgroup/system.slice/memory.max", "max\n");
-  EXPECT_EQ(Bytes(), 600 * kMib);
+TEST_F(CgroupMemory, IsTheSmallestLimitOfTheOwnGroup) {
+  struct Case {
+    const char *why, *group, *mounts, *folder;
+    uint64_t max_mib, high_mib, limit_mib;  // high: 0: none
+  };
+  for (const Case& c :
+       {Case{"a service of systemd", "/system.slice/touchstone-server.service", kV2Mount,
+             "/sys/fs/cgroup/system.slice/touchstone-server.service", 600, 0, 600},
+        Case{"held up from its memory.high on", "/a", kV2Mount, "/sys/fs/cgroup/a", 600, 400, 400},
+        Case{"a mount with a blank in its name", "/a:b",
+             "29 23 0:26 / /mnt/own\\040groups rw - cgroup2 none rw\n", "/mnt/own groups/a:b", 90, 0, 90}}) {
+    Process(std::string("0::") + c.group + "\n", c.mounts);
+    Limit(std::string(c.folder) + "/memory.max", c.max_mib * kMib);
+    if (c.high_mib > 0) Limit(std::string(c.folder) + "/memory.high", c.high_mib * kMib);
+    Write(std::filesystem::path(c.folder).parent_path().string() + "/memory.max", "max\n");
+    EXPECT_EQ(Bytes(), c.limit_mib * kMib) << c.why;
+  }
 }
 
 TEST_F(CgroupMemory, IsTheSmallestOfAllGroupsAround) {
@@ -53,13 +65,6 @@ TEST_F(CgroupMemory, IsTheSmallestOfAllGroupsAround) {
   EXPECT_EQ(Bytes(), 700 * kMib);
   Limit("/sys/fs/cgroup/system.slice/memory.max", 500 * kMib);
   EXPECT_EQ(Bytes(), 500 * kMib);
-}
-
-TEST_F(CgroupMemory, OfAGroupThatIsHeldUpIsItsMemoryHigh) {
-  Process("0::/a\n", kV2Mount);
-  Limit("/sys/fs/cgroup/a/memory.max", 600 * kMib);
-  Limit("/sys/fs/cgroup/a/memory.high", 400 * kMib);
-  EXPECT_EQ(Bytes(), 400 * kMib);
 }
 
 TEST_F(CgroupMemory, IsFoundInVersion1AmongOtherControllers) {
@@ -110,12 +115,6 @@ TEST_F(CgroupMemory, OfAContainerWithoutANamespaceIsWhatIsMounted) {
   Process("0::/../sibling\n", kV2Mount);
   Limit("/sys/fs/cgroup/memory.max", 300 * kMib);
   EXPECT_EQ(Bytes(), 300 * kMib);
-}
-
-TEST_F(CgroupMemory, IsFoundAtAMountWithBlanksInItsName) {
-  Process("0::/a:b\n", "29 23 0:26 / /mnt/own\\040groups rw - cgroup2 none rw\n");
-  Limit("/mnt/own groups/a:b/memory.max", 90 * kMib);
-  EXPECT_EQ(Bytes(), 90 * kMib);
 }
 
 TEST_F(CgroupMemory, IsNoneWhereNothingLimitsIt) {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -21,8 +22,8 @@ constexpr char kWords[] =
     "for less at "
     "once\n";
 
-const char* program_name = "";
-int exit_status = 1;
+const char* program_name = nullptr;  // null: before RunWithinMemory
+int exit_status = 71;                // EX_OSERR
 std::atomic<uint64_t> failures{0};
 
 void CountAndThrow() {
@@ -32,7 +33,8 @@ void CountAndThrow() {
 
 // Without memory: a handler of signals may do this.
 void Say() {
-  (void)!write(STDERR_FILENO, program_name, std::strlen(program_name));
+  const char* name = program_name != nullptr ? program_name : program_invocation_short_name;
+  (void)!write(STDERR_FILENO, name, std::strlen(name));
   (void)!write(STDERR_FILENO, kWords, sizeof kWords - 1);
 }
 
@@ -65,6 +67,14 @@ void OnAbort(int) {
   std::abort();
 }
 
+void NoticeWantOfMemory() {
+  std::set_terminate(OnTerminate);
+  signal(SIGABRT, OnAbort);
+}
+
+// Libraries ask for memory in their constructors: before those, and so before main().
+__attribute__((section(".preinit_array"), used)) void (*const before_libraries)() = NoticeWantOfMemory;
+
 }  // namespace
 
 uint64_t OutOfMemoryCount() {
@@ -74,8 +84,7 @@ uint64_t OutOfMemoryCount() {
 int RunWithinMemory(const char* program, int status, const std::function<int()>& run) {
   program_name = program, exit_status = status;
   std::set_new_handler(CountAndThrow);
-  std::set_terminate(OnTerminate);
-  signal(SIGABRT, OnAbort);
+  NoticeWantOfMemory();
   try {
     return run();
   } catch (const std::bad_alloc&) {

@@ -14,9 +14,10 @@ std::string LimitInWords(double value) {
   return ShortestNumber(value);
 }
 
-absl::Status OverLimit(absl::string_view asked, double value, absl::string_view limit_name, double limit) {
-  return absl::ResourceExhaustedError(absl::StrCat(asked, " ", LimitInWords(value), ": at most ",
-                                                   LimitInWords(limit), " (", limit_name, ")"));
+absl::Status OverLimit(absl::string_view asked, const absl::AlphaNum& value, absl::string_view limit_name,
+                       double limit) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat(asked, " ", value, ": at most ", LimitInWords(limit), " (", limit_name, ")"));
 }
 
 absl::Status Busy(absl::string_view what, absl::string_view limit_name, double limit) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/string_view.h>
 
 namespace touchstone {
@@ -13,7 +14,8 @@ std::string LimitInWords(double value);
 
 // RESOURCE_EXHAUSTED: "touches has 30000: at most 20000 (max_touches_per_request)", of `asked` "touches has". The
 // request itself is too large: waiting does not help.
-absl::Status OverLimit(absl::string_view asked, double value, absl::string_view limit_name, double limit);
+absl::Status OverLimit(absl::string_view asked, const absl::AlphaNum& value, absl::string_view limit_name,
+                       double limit);
 
 // RESOURCE_EXHAUSTED: "256 dataset streams run already (max_streams = 256): try again later, or at another one". Others use
 // what there is; clients know by "try again" that waiting helps.

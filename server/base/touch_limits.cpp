@@ -17,11 +17,13 @@ bool MakeUnit(Eigen::Vector3d* vector) {
 }  // namespace
 
 VectorFlaw MakeOrthonormal(Eigen::Vector3d* approach, Eigen::Vector3d* lateral) {
-  if (!MakeUnit(approach)) return VectorFlaw::kApproachLength;
-  if (!MakeUnit(lateral)) return VectorFlaw::kLateralLength;
-  const double cosine = approach->dot(*lateral);
+  Eigen::Vector3d unit_approach = *approach, unit_lateral = *lateral;
+  if (!MakeUnit(&unit_approach)) return VectorFlaw::kApproachLength;
+  if (!MakeUnit(&unit_lateral)) return VectorFlaw::kLateralLength;
+  const double cosine = unit_approach.dot(unit_lateral);
   if (!(std::abs(cosine) <= kVectorTolerance)) return VectorFlaw::kNotPerpendicular;
-  if (std::abs(cosine) > kRounding) *lateral = (*lateral - cosine * *approach).normalized();
+  if (std::abs(cosine) > kRounding) unit_lateral = (unit_lateral - cosine * unit_approach).normalized();
+  *approach = unit_approach, *lateral = unit_lateral;
   return VectorFlaw::kNone;
 }
 

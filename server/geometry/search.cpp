@@ -5,9 +5,9 @@
 
 #include <cmath>
 #include <mutex>
+#include <new>
 #include <thread>
 
-#include "server/base/check.h"
 #include "server/geometry/pieces.h"
 
 namespace touchstone::geometry {
@@ -22,7 +22,8 @@ std::atomic<int64_t> embree_bytes{0};
 
 RTCDevice NewDevice() {
   const RTCDevice device = rtcNewDevice(nullptr);
-  TOUCHSTONE_CHECK(device != nullptr);
+  // Its threads and tables are all that it asks for here.
+  if (device == nullptr) throw std::bad_alloc();
   rtcSetDeviceMemoryMonitorFunction(
       device,
       [](void*, ssize_t bytes, bool) {

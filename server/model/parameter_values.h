@@ -9,14 +9,10 @@
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
 
+#include "server/base/file_number.h"
 #include "server/model/model.h"
 
 namespace touchstone::model {
-
-// The SI value as a number of files: the one of fewest digits (15 to 17) that reads back to the same SI
-// value, "30" for 0.030 m. Where no number of files does (a fit may end there), the nearest one; that reads
-// back to the same text.
-std::string FileNumber(Unit unit, double value_si);
 
 // The values of one parameter: "1.5", or "[0.25, 0, -0.25]".
 std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> values_si);

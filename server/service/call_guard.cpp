@@ -20,8 +20,9 @@ source::MotionGuard TimeGuardOf(const ServerOptions& options, bool moves) {
   return [moves, max_s = options.max_unary_s, clock = options.clock,
           begin = options.clock->Now()]() -> absl::Status {
     const double s = clock->SecondsSince(begin);
-    return moves || s <= max_s ? absl::OkStatus()
-                               : OverLimit("the call is not done after seconds:", s, "max_unary_s", max_s);
+    return moves || s <= max_s
+               ? absl::OkStatus()
+               : OverLimit("the call is not done after seconds:", LimitInWords(s), "max_unary_s", max_s);
   };
 }
 

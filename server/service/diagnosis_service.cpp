@@ -151,7 +151,8 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
     if (context->IsCancelled() || late() || !send(progress)) worker.Cancel();
   }
   if (absl::IsCancelled(worker.report().status()) && late())
-    return OverLimit("the diagnosis is not done after seconds:", max_s, "max_diagnosis_s", max_s);
+    return OverLimit("the diagnosis is not done after seconds:", LimitInWords(max_s), "max_diagnosis_s",
+                     max_s);
   if (context->IsCancelled()) return absl::CancelledError("the request was cancelled");
   TOUCHSTONE_RETURN_IF_ERROR(worker.report().status());
   *result = *std::move(worker.report());

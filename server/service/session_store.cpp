@@ -6,10 +6,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
+#include "server/base/file_writer.h"
 #include "server/base/new_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -239,15 +241,20 @@ absl::Status SessionStore::Export(
 
 absl::Status SessionStore::Delete(const std::string& name) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckName(name));
-  bool deleted = false;
+  bool known = false;
   {
     std::lock_guard<std::mutex> lock(mutex_);
-    deleted = known_.erase(name) > 0;
+    known = known_.erase(name) > 0;
   }
+  if (folder_.empty()) return known ? absl::OkStatus() : NoSession(name);
   Version version;
   std::string path;
-  if (!folder_.empty()) deleted = Stat(name, &version, &path) && ::unlink(path.c_str()) == 0;
-  return deleted ? absl::OkStatus() : NoSession(name);
+  if (!Stat(name, &version, &path)) return NoSession(name);
+  // The folder is the server's: what is wrong with it is no mistake of who asks.
+  if (::unlink(path.c_str()) != 0)
+    return absl::UnavailableError(FileError(errno, path, "cannot be removed").message());
+  const absl::Status synced = SyncFolderOf(path);
+  return synced.ok() ? synced : absl::UnavailableError(synced.message());
 }
 
 }  // namespace touchstone::service

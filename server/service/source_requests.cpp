@@ -14,6 +14,19 @@
 #include "server/service/source_messages.h"
 
 namespace touchstone::service {
+namespace {
+
+// Of a field that 0 leaves as it is. What an int does not hold is refused here, as it was sent.
+absl::Status SetIfGiven(uint32_t sent, absl::string_view field, int* value) {
+  constexpr int kMax = std::numeric_limits<int>::max();
+  if (sent > static_cast<uint32_t>(kMax))
+    return absl::InvalidArgumentError(absl::StrCat(field, " = ", sent, ": must be at most ", kMax));
+  if (sent != 0) *value = static_cast<int>(sent);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::StatusOr<image::Camera> FromProto(const v1::View& view, const std::string& where) {
   switch (view.view_case()) {
     case v1::View::kTouch: {
@@ -53,11 +66,9 @@ absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
     case v1::Plan::kFaces: {
       plan.kind = touch::Plan::Kind::kFaces;
       const v1::FacesPlan& faces = message.faces();
-      // The plan's check refuses what is too many; a number that no int holds becomes the largest one.
-      constexpr uint32_t kMax = std::numeric_limits<int>::max();
-      if (faces.samples_per_face() != 0)
-        plan.faces.samples_per_face = static_cast<int>(std::min(faces.samples_per_face(), kMax));
-      if (faces.rounds() != 0) plan.faces.rounds = static_cast<int>(std::min(faces.rounds(), kMax));
+      TOUCHSTONE_RETURN_IF_ERROR(
+          SetIfGiven(faces.samples_per_face(), "plan.faces.samples_per_face", &plan.faces.samples_per_face));
+      TOUCHSTONE_RETURN_IF_ERROR(SetIfGiven(faces.rounds(), "plan.faces.rounds", &plan.faces.rounds));
       if (faces.has_max_tilt_rad()) plan.faces.max_tilt_rad = faces.max_tilt_rad();
       if (faces.has_spread()) plan.faces.spread = faces.spread();
       if (faces.standoff_m() != 0) plan.faces.standoff_m = faces.standoff_m();
@@ -85,12 +96,9 @@ absl::StatusOr<touch::Plan> FromProto(const v1::Plan& message) {
 
 absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message) {
   dataset::DatasetImage image;
-  // Out-of-range numbers reach the check as what they are: no wrap-around.
-  const auto side = [](uint32_t value) {
-    return value == 0 ? 224 : static_cast<int>(std::min<uint32_t>(value, 1u << 30));
-  };
-  image.options.width = side(message.width());
-  image.options.height = side(message.height());
+  image.options.width = image.options.height = 224;
+  TOUCHSTONE_RETURN_IF_ERROR(SetIfGiven(message.width(), "image.width", &image.options.width));
+  TOUCHSTONE_RETURN_IF_ERROR(SetIfGiven(message.height(), "image.height", &image.options.height));
   image.options.format =
       message.format() == v1::PIXEL_FORMAT_RGB ? image::PixelFormat::kRgb : image::PixelFormat::kGrey;
   image.options.shading_style = message.shading_style() == v1::SHADING_STYLE_DARK_ON_WHITE
@@ -101,8 +109,7 @@ absl::StatusOr<dataset::DatasetImage> FromProto(const v1::ImageSpec& message) {
   image.encoding = message.encoding() == v1::IMAGE_ENCODING_PNG    ? dataset::ImageEncoding::kPng
                    : message.encoding() == v1::IMAGE_ENCODING_JPEG ? dataset::ImageEncoding::kJpeg
                                                                    : dataset::ImageEncoding::kRaw;
-  if (message.jpeg_quality() != 0)
-    image.jpeg_quality = static_cast<int>(std::min<uint32_t>(message.jpeg_quality(), 1000));
+  TOUCHSTONE_RETURN_IF_ERROR(SetIfGiven(message.jpeg_quality(), "image.jpeg_quality", &image.jpeg_quality));
   image.normalize = message.normalize();
   if (message.vertical_fov_rad() != 0) image.vertical_fov_rad = message.vertical_fov_rad();
   for (const auto& [value, valid, name] :

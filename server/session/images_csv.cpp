@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -38,15 +39,10 @@ double PartOf(const CameraPlacement& placement, int part) {
   return part < 3 ? placement.eye_m[part] : part < 6 ? placement.at_m[part - 3] : placement.up[part - 6];
 }
 
-std::string VectorText(const Eigen::Vector3d& v, double unit) {
-  return absl::StrCat("(", ShortestNumber(v.x() / unit), ", ", ShortestNumber(v.y() / unit), ", ",
-                      ShortestNumber(v.z() / unit), ")");
-}
-
 // Why a placement gives no view; empty: it does.
 std::string WrongPlacement(const CameraPlacement& placement, absl::string_view prefix) {
-  const std::string eye = VectorText(placement.eye_m, kMetresPerMillimetre),
-                    at = VectorText(placement.at_m, kMetresPerMillimetre), up = VectorText(placement.up, 1);
+  const std::string eye = VectorText(placement.eye_m, Unit::kMillimetre),
+                    at = VectorText(placement.at_m, Unit::kMillimetre), up = VectorText(placement.up);
   const Eigen::Vector3d view = placement.at_m - placement.eye_m;
   if (view.norm() < kMinViewM)
     return absl::StrCat("columns ", prefix, "eye_* and ", prefix, "at_*: the camera at ", eye,
@@ -290,7 +286,7 @@ std::string ImagesCsvRow(const PhotographRow& row, const std::string& object, co
   const auto append = [&line](const CameraPlacement& placement) {
     for (int part = 0; part < kPlacementParts; ++part)
       absl::StrAppend(&line, ",",
-                      IsLength(part) ? model::FileNumber(Unit::kMillimetre, PartOf(placement, part))
+                      IsLength(part) ? FileNumber(Unit::kMillimetre, PartOf(placement, part))
                                      : ShortestNumber(PartOf(placement, part)));
   };
   append(row.commanded);

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -22,11 +23,10 @@ absl::Status JournalFile::EnsureSession(const JournalSession& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<Known> known, FindSession(session.name));
   if (!known) return Write([&] { return InsertSession(file_.get(), session).status(); });
   if (known->fingers == session.fingers && known->spacing_m == session.spacing_m) return absl::OkStatus();
-  return absl::FailedPreconditionError(
-      absl::StrCat(Called(), "session '", session.name, "' was made with ", known->fingers, " fingers ",
-                   ShortestNumber(known->spacing_m * kMillimetresPerMetre), " mm apart, not ",
-                   session.fingers, " fingers ", ShortestNumber(session.spacing_m * kMillimetresPerMetre),
-                   " mm apart; begin a session of another name"));
+  return absl::FailedPreconditionError(absl::StrCat(
+      Called(), "session '", session.name, "' was made with ", known->fingers, " fingers ",
+      FileNumber(Unit::kMillimetre, known->spacing_m), " mm apart, not ", session.fingers, " fingers ",
+      FileNumber(Unit::kMillimetre, session.spacing_m), " mm apart; begin a session of another name"));
 }
 
 absl::Status JournalFile::CheckHead(const JournalSession& session) const {
@@ -34,8 +34,8 @@ absl::Status JournalFile::CheckHead(const JournalSession& session) const {
   if (session.fingers >= 1 && session.fingers <= kMaxFingers && session.spacing_m > 0)
     return absl::OkStatus();
   return Wrong(absl::StrCat("session '", session.name, "' has ", session.fingers, " fingers ",
-                            ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart; 1 to ",
-                            kMaxFingers, " and more than 0 mm are possible"));
+                            FileNumber(Unit::kMillimetre, session.spacing_m), " mm apart; 1 to ", kMaxFingers,
+                            " and more than 0 mm are possible"));
 }
 
 absl::Status JournalFile::AddSession(const SessionContent& content) {

@@ -219,6 +219,7 @@ absl::StatusOr<OpenedJournal> OpenJournalFile(const std::string& path, Journal::
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckTables(&file, kJournalVersion));
   TOUCHSTONE_RETURN_IF_ERROR(CheckSessionCount(&file));
+  TOUCHSTONE_RETURN_IF_ERROR(file.CheckWritable());
   return opened;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/base/file_number.h"
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -17,10 +18,13 @@
 namespace touchstone::session {
 namespace {
 
-absl::Status WrongValue(const MeasurementSet& set, int row, absl::string_view what, double value) {
+absl::Status WrongText(const MeasurementSet& set, int row, absl::string_view what, absl::string_view value) {
   return absl::InvalidArgumentError(absl::StrCat(set.origin, ":", set.line[row], ": touch ", set.touch[row],
-                                                 ": ", what, " (", ShortestNumber(value),
-                                                 ") is out of range"));
+                                                 ": ", what, " (", value, ") is out of range"));
+}
+
+absl::Status WrongValue(const MeasurementSet& set, int row, absl::string_view what, double value) {
+  return WrongText(set, row, what, ShortestNumber(value));
 }
 
 // Every column has an entry per touch, or none where it may be missing.
@@ -42,7 +46,7 @@ absl::Status CheckSizes(const MeasurementSet& set) {
 absl::Status CheckPose(MeasurementSet* set, int row) {
   const Eigen::Vector3d& target_m = set->target_m[row];
   if (!(target_m.cwiseAbs().maxCoeff() <= kMaxTargetM) || !target_m.allFinite())
-    return WrongValue(*set, row, "target_m", target_m.cwiseAbs().maxCoeff());
+    return WrongText(*set, row, "target_m", VectorText(target_m));
   if (!(set->standoff_m[row] >= 0 && set->standoff_m[row] <= kMaxStandoffM))
     return WrongValue(*set, row, "standoff_m", set->standoff_m[row]);
   if (!(set->speed_m_s[row] > 0 && set->speed_m_s[row] <= kMaxSpeedMS))

@@ -16,7 +16,7 @@ namespace touchstone::session {
 namespace {
 
 std::string Millimetres(double metres) {
-  return model::FileNumber(Unit::kMillimetre, metres);
+  return FileNumber(Unit::kMillimetre, metres);
 }
 
 void AppendVector(const v1::Vector3& v, std::string* row) {
@@ -59,13 +59,13 @@ std::string MeasurementHeader(int fingers, const MeasurementColumns& columns) {
 std::string MeasurementRow(const MeasuredTouch& touch, const MeasurementColumns& columns) {
   const v1::CommandedTouch& c = touch.commanded;
   std::string row = absl::StrCat(touch.touch, ",", QuotedField(touch.object), ",",
-                                 model::FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
+                                 FileNumber(Unit::kMillimetrePerSecond, c.speed_m_s()), ",",
                                  Millimetres(c.standoff_m()), ",", Millimetres(c.target_m().x()), ",",
                                  Millimetres(c.target_m().y()), ",", Millimetres(c.target_m().z()));
   AppendVector(c.approach(), &row);
   AppendVector(c.lateral(), &row);
   for (const double time_s : touch.time_s)
-    absl::StrAppend(&row, ",", std::isnan(time_s) ? "" : model::FileNumber(Unit::kMicrosecond, time_s));
+    absl::StrAppend(&row, ",", std::isnan(time_s) ? "" : FileNumber(Unit::kMicrosecond, time_s));
   if (columns.session_time) absl::StrAppend(&row, ",", ShortestNumber(c.session_time_s()));
   if (columns.round) absl::StrAppend(&row, ",", touch.round.value_or(0));
   if (columns.face) absl::StrAppend(&row, ",", touch.face.value_or(0));

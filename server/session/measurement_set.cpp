@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/base/file_number.h"
 #include "server/base/nan.h"
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
@@ -172,7 +173,7 @@ class RowReader {
     Eigen::Vector3d& approach = set_.approach[row];
     Eigen::Vector3d& lateral = set_.lateral[row];
     const auto not_unit = [&](const Eigen::Vector3d& vector, const char* name) {
-      return Wrong(absl::StrCat("columns ", name, "_x, ", name, "_y, ", name, "_z: ", Text(vector),
+      return Wrong(absl::StrCat("columns ", name, "_x, ", name, "_y, ", name, "_z: ", VectorText(vector),
                                 " has length ", ShortestNumber(vector.norm()),
                                 "; a unit vector was expected (within 0.001)"));
     };
@@ -184,17 +185,12 @@ class RowReader {
       case VectorFlaw::kLateralLength:
         return not_unit(lateral, "lateral");
       case VectorFlaw::kNotPerpendicular:
-        return Wrong(absl::StrCat("columns lateral_x, lateral_y, lateral_z: ", Text(lateral),
-                                  " is not perpendicular to the approach ", Text(approach),
+        return Wrong(absl::StrCat("columns lateral_x, lateral_y, lateral_z: ", VectorText(lateral),
+                                  " is not perpendicular to the approach ", VectorText(approach),
                                   ": their dot product is ", ShortestNumber(approach.dot(lateral)),
                                   "; 0 was expected (within 0.001)"));
     }
     return absl::OkStatus();
-  }
-
-  static std::string Text(const Eigen::Vector3d& v) {
-    return absl::StrCat("(", ShortestNumber(v.x()), ", ", ShortestNumber(v.y()), ", ", ShortestNumber(v.z()),
-                        ")");
   }
 
   absl::Status OutOfRange(size_t i, const std::string& expected) const {

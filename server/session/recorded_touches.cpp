@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -49,8 +50,8 @@ absl::StatusOr<std::unique_ptr<RecordedTouches>> RecordedTouches::Read(
     if (session.fingers != recorded->fingers_ || session.spacing_m != recorded->spacing_m_)
       return absl::InvalidArgumentError(absl::StrCat(
           "session '", session.name, "' has ", session.fingers, " fingers ",
-          ShortestNumber(session.spacing_m * kMillimetresPerMetre), " mm apart, '", chosen[0].name, "' has ",
-          recorded->fingers_, " fingers ", ShortestNumber(recorded->spacing_m_ * kMillimetresPerMetre),
+          FileNumber(Unit::kMillimetre, session.spacing_m), " mm apart, '", chosen[0].name, "' has ",
+          recorded->fingers_, " fingers ", FileNumber(Unit::kMillimetre, recorded->spacing_m_),
           " mm apart; sessions of one end effector can be served together"));
     TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session.name, [&](const JournalTouch& touch) {
       if (touch.stage == TouchStage::kDone) recorded->Add(touch);

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -50,6 +51,7 @@ SqliteStatement& SqliteStatement::BindNull() {
 
 absl::StatusOr<bool> SqliteStatement::Step() {
   if (result_ != SQLITE_OK) return file_->Error(result_);
+  errno = 0;
   const int result = sqlite3_step(statement_);
   if (result == SQLITE_ROW) return true;
   if (result == SQLITE_DONE) return false;
@@ -135,6 +137,7 @@ SqliteStatement SqliteFile::Prepare(const char* sql) {
 }
 
 absl::Status SqliteFile::Run(const char* sql) {
+  errno = 0;
   const int result = sqlite3_exec(database_, sql, nullptr, nullptr, nullptr);
   return result == SQLITE_OK ? absl::OkStatus() : Error(result);
 }
@@ -146,11 +149,21 @@ absl::StatusOr<int64_t> SqliteFile::Number(const char* sql) {
   return *row ? statement.Integer(0) : 0;
 }
 
+absl::Status SqliteFile::CheckWritable() {
+  if (sqlite3_db_readonly(database_, "main") == 1) return Error(SQLITE_READONLY);
+  return Transact([] { return absl::OkStatus(); });
+}
+
 absl::Status SqliteFile::Error(int result) const {
-  const int error = database_ == nullptr ? 0 : sqlite3_system_errno(database_);
+  const int failed = errno;
+  // SQLite keeps none of a COMMIT.
+  int error = database_ == nullptr ? 0 : sqlite3_system_errno(database_);
+  if (error == 0 && (result & 0xFF) == SQLITE_IOERR) error = failed;
   const auto message = [&](absl::string_view what, absl::string_view remedy) {
     return absl::StrCat("journal ", path_, " ", what, " (", sqlite3_errstr(result),
-                        database_ == nullptr ? "" : absl::StrCat(": ", sqlite3_errmsg(database_)),
+                        database_ == nullptr || sqlite3_errcode(database_) == SQLITE_OK
+                            ? ""
+                            : absl::StrCat(": ", sqlite3_errmsg(database_)),
                         error == 0 ? "" : absl::StrCat(", ", std::strerror(error)), "); ", remedy);
   };
   switch (result & 0xFF) {
@@ -172,7 +185,8 @@ absl::Status SqliteFile::Error(int result) const {
     case SQLITE_PERM:
     case SQLITE_AUTH:
       return absl::PermissionDeniedError(
-          message("may not be written", "change the permissions of file and folder, or copy it elsewhere"));
+          message("may not be written",
+                  "change the permissions of file and folder, check its disk, or copy it elsewhere"));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return absl::UnavailableError(message("is in use by another program", "end that program or wait"));

@@ -94,6 +94,9 @@ class SqliteFile {
     return status;
   }
 
+  // A file (or its WAL) that the disk once refused to open for writing, SQLite opens for reading only, and does not say so.
+  absl::Status CheckWritable();
+
   // Whether its rows carry checksums; true unless said otherwise.
   bool has_checksums() const { return has_checksums_; }
   void set_has_checksums(bool has) { has_checksums_ = has; }

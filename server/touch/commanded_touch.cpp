@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
@@ -12,15 +13,11 @@
 namespace touchstone::touch {
 namespace {
 
-std::string Text(const Eigen::Vector3d& v) {
-  return absl::StrCat("(", ShortestNumber(v.x()), ", ", ShortestNumber(v.y()), ", ", ShortestNumber(v.z()),
-                      ")");
-}
-
 absl::Status NotUnit(const Eigen::Vector3d& vector, const std::string& field) {
   if (!vector.allFinite())
-    return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(vector), ": must be finite numbers"));
-  return absl::InvalidArgumentError(absl::StrCat(field, " = ", Text(vector), " has length ",
+    return absl::InvalidArgumentError(
+        absl::StrCat(field, " = ", VectorText(vector), ": must be finite numbers"));
+  return absl::InvalidArgumentError(absl::StrCat(field, " = ", VectorText(vector), " has length ",
                                                  ShortestNumber(vector.norm()),
                                                  ": must be a unit vector (within 0.001)"));
 }
@@ -39,7 +36,7 @@ absl::Status MakeExact(CommandedTouch* touch, const std::string& where) {
   const std::string prefix = where.empty() ? "" : absl::StrCat(where, ".");
   if (!touch->target_m.allFinite() || touch->target_m.cwiseAbs().maxCoeff() > kMaxTargetM)
     return absl::InvalidArgumentError(
-        absl::StrCat(prefix, "target_m = ", Text(touch->target_m),
+        absl::StrCat(prefix, "target_m = ", VectorText(touch->target_m),
                      ": must be finite and within 100 m of the object's origin"));
   switch (MakeOrthonormal(&touch->approach, &touch->lateral)) {
     case VectorFlaw::kNone:
@@ -50,8 +47,8 @@ absl::Status MakeExact(CommandedTouch* touch, const std::string& where) {
       return NotUnit(touch->lateral, prefix + "lateral");
     case VectorFlaw::kNotPerpendicular:
       return absl::InvalidArgumentError(absl::StrCat(
-          prefix, "lateral = ", Text(touch->lateral),
-          " is not perpendicular to approach = ", Text(touch->approach), ": their dot product is ",
+          prefix, "lateral = ", VectorText(touch->lateral),
+          " is not perpendicular to approach = ", VectorText(touch->approach), ": their dot product is ",
           ShortestNumber(touch->approach.dot(touch->lateral)), " and must be 0 (within 0.001)"));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CheckRange(touch->standoff_m, 0, kMaxStandoffM, false, prefix + "standoff_m"));

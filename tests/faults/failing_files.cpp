@@ -69,6 +69,10 @@ bool IsWatched(int folder, const char* path) {
 
 // Whether this call, on something that is watched, fails; errno is set then.
 bool Fails(const char* call, bool takes_room = true) {
+  // A failed removal leaves what is whole: of the other modes only a kill may come before it.
+  const bool removes = std::strcmp(call, "unlink") == 0;
+  if (plan->mode == FailureMode::kRemoval ? !removes : removes && plan->mode != FailureMode::kKill)
+    return false;
   const int32_t number = ++plan->calls, fails_at = plan->fails_at;
   const FailureMode mode = plan->mode;
   // A full disk is one to what takes room; what was made can still be looked at and removed.
@@ -214,9 +218,8 @@ int mkdir(const char* path, mode_t mode) noexcept {
   if (IsWatched(AT_FDCWD, path) && Fails("mkdir")) return -1;
   return Own<int(const char*, mode_t)>("mkdir")(path, mode);
 }
-// A failed removal leaves what is whole: only a kill may come before it.
 int unlink(const char* path) noexcept {
-  if (IsWatched(AT_FDCWD, path) && plan->mode == FailureMode::kKill) Fails("unlink");
+  if (IsWatched(AT_FDCWD, path) && Fails("unlink")) return -1;
   return Own<int(const char*)>("unlink")(path);
 }
 

@@ -10,7 +10,8 @@ enum class FailureMode : int32_t {
   kOnce,        // the n-th call fails
   kFromThenOn,  // and all that follow
   kShort,       // writes half of what it was given
-  kKill         // the program is killed before it
+  kKill,        // the program is killed before it
+  kRemoval      // the n-th removal fails; only those are counted
 };
 
 // Laid out alike in failing_files.py. Shared by the program and whoever watches it.

@@ -9,7 +9,7 @@ import subprocess
 import grpc
 
 import failing_files
-from programs import CLIENT, Result, Server, create_session, measurements, scratch
+from programs import CLIENT, GATEWAY, SERVER, Result, Server, create_session, measurements, scratch
 
 NAMES = ("export .h5", "import .csv", "image set from .h5", "mesh", "plan", "reports")
 MIB = 1 << 20
@@ -79,9 +79,37 @@ def run_server(limits_mib: tuple[int, ...], result: Result) -> str:
     return f"a server of {limits_mib} MiB: {refused} sessions were refused, {ended} processes ended and said why"
 
 
+START_LIMITS_MIB = (120, 200, 260, 300, 350, 400, 500)
+START_S = 20.0  # far more than a program takes that does not hang
+WORDS_OF_WANT = ("not enough memory", "failed to map segment", "cannot allocate")  # the last two are the dynamic linker's
+
+
+def run_starts(limits_mib: tuple[int, ...], result: Result) -> str:
+    """Programs whose libraries get no memory before main() is reached."""
+    started = refused = 0
+    with scratch() as folder:
+        (pathlib.Path(folder) / "set.csv").write_bytes(measurements(30, 1000.0))
+        for words in ([str(CLIENT), "--help"], [str(CLIENT), "diagnose", f"{folder}/set.csv"], [str(SERVER), "--version"],
+                      [str(GATEWAY), "--version"]):
+            for limit in limits_mib:
+                where = f"{words[0].rsplit('/', 1)[-1]} {words[1]} with {limit} MiB"
+                try:
+                    done = subprocess.run(_limited(limit, words), capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+                                          timeout=START_S)
+                except subprocess.TimeoutExpired:
+                    result.failures.append(f"{where}: it hangs")
+                    continue
+                said = any(word in done.stderr for word in WORDS_OF_WANT)
+                result.expect(0 <= done.returncode < 128 and (done.returncode == 0 or said),
+                              f"{where}: status {done.returncode}: {done.stderr[-200:]}")
+                started, refused = started + (done.returncode == 0), refused + (done.returncode != 0)
+    return f"starts with {limits_mib} MiB: {started} came through, {refused} said that there is not enough memory"
+
+
 def run(steps: int = 12, names: tuple[str, ...] = NAMES, limits_mib: tuple[int, ...] = (1500, 2500, 4000)) -> Result:
     """steps: limits that are tried of each command; limits_mib: of a server."""
     result = Result()
+    result.seen.append(run_starts(START_LIMITS_MIB, result))
     with scratch() as folder:
         inputs = pathlib.Path(folder) / "in"
         inputs.mkdir()

@@ -6,6 +6,7 @@ import pytest
 import clock_jumps
 import disk_full
 import failing_files
+import failing_stores
 import failover
 import flat_memory
 import floods
@@ -62,6 +63,29 @@ def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
     # For one command, those of the faults that differ in what the program can still do; the tests in C++ have all of them.
     faults = [fault for fault in failing_files.FAULTS if not name or fault.name in ("full from then on", "killed")]
     passes(failing_files.run((name,) if name else (), faults))
+
+
+def test_libraries_without_memory_do_not_hang_a_program():
+    result = programs.Result()
+    result.seen.append(little_memory.run_starts((260, 350), result))
+    passes(result)
+
+
+def test_a_server_whose_disk_fails_keeps_what_it_acknowledged():
+    result = programs.Result()
+    result.seen.append(failing_stores.run_server(failing_stores.LIVING[:2], 9, result))
+    passes(result)
+
+
+def test_a_gateway_whose_disk_fails_keeps_what_it_acknowledged():
+    result = programs.Result()
+    result.seen.append(failing_stores.run_gateway(failing_stores.LIVING[:2], 7, result))
+    passes(result)
+
+
+@pytest.mark.second_tier("repeated: every call instead of some")
+def test_servers_whose_disks_fail_keep_what_they_acknowledged():
+    passes(failing_stores.run())
 
 
 @pytest.mark.second_tier("repeated: the same commands with less memory each time")

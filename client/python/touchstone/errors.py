@@ -5,6 +5,7 @@ from __future__ import annotations
 import grpc
 
 from .channel import proxy_for
+from .printable import printable
 
 
 class TouchstoneError(Exception):
@@ -16,7 +17,7 @@ class TouchstoneError(Exception):
     """
 
     def __init__(self, message: str, code: str = "", target: str = ""):
-        super().__init__(message)
+        super().__init__(printable(message))
         self.code = code
         self.target = target
 

@@ -26,6 +26,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from .printable import printable
 from .v1 import types_pb2
 from .whole_file import whole_file
 
@@ -293,9 +294,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise ExportError(f"{options.output} exists; replace it with --force, or choose another name.")
         counts = export(options.session, options.output)
     except (ExportError, ImportError, OSError, KeyError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(printable(f"error: {error}"), file=sys.stderr)
         return 1
-    print(f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items()))
+    print(printable(f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items())))
     return 0
 
 

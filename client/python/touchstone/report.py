@@ -14,6 +14,7 @@ from google.protobuf import json_format
 from .errors import InvalidRequest
 from .measurements import Row
 from .plans import Touches
+from .printable import printable
 from .v1 import diagnosis_pb2
 from .whole_file import whole_file
 
@@ -209,11 +210,11 @@ class Report:
         _write(path, self.improved_model)
 
     def __str__(self) -> str:
-        return self.summary
+        return printable(self.summary)
 
     def __repr__(self) -> str:
         effects = ", ".join(step.effect for step in self.message.steps)
-        return f"Report({self.verdict or 'compared'}{': ' + effects if effects else ''})"
+        return printable(f"Report({self.verdict or 'compared'}{': ' + effects if effects else ''})")
 
 
 def _kind(number: int) -> str:

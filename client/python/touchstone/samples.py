@@ -15,6 +15,7 @@ from .batch import Batch, Column, EncodedImages
 from .connection import Connection
 from .dataset import Dataset, Header
 from .errors import InvalidRequest
+from .printable import printable
 from .v1 import source_pb2
 
 # Samples of one request. A list that is longer is asked for in parts: few megabytes of indices, and what was received is
@@ -84,7 +85,7 @@ class Samples(Sequence[Mapping[str, Any]]):
             self._own.connection = None
 
     def __repr__(self) -> str:
-        return f"Samples({len(self)} of {', '.join(self.spec.objects)})"
+        return printable(f"Samples({len(self)} of {', '.join(self.spec.objects)})")
 
     def __getstate__(self) -> dict[str, Any]:
         """Without connections and leases: a lease belongs to the process that took it."""

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
@@ -90,17 +91,17 @@ absl::Status UrMotionPlanner::CheckTouch(const std::string& object, calibration:
   if (!touch.target_m.allFinite() || !touch.approach.allFinite() || !touch.lateral.allFinite() ||
       !std::isfinite(touch.stroke_m))
     return absl::InvalidArgumentError("target, approach, lateral and stroke must be finite numbers");
+  const auto mm = [](double metres) { return FileNumber(Unit::kMillimetre, metres); };
   if (!(touch.speed_m_s >= limits_.min_speed_m_s) || touch.speed_m_s > limits_.max_speed_m_s)
-    return absl::OutOfRangeError(absl::StrFormat(
-        "speed %.4g mm/s: must be from %.4g to %.4g mm/s", touch.speed_m_s / kMetresPerMillimetre,
-        limits_.min_speed_m_s / kMetresPerMillimetre, limits_.max_speed_m_s / kMetresPerMillimetre));
-  if (!(touch.standoff_m >= kMinStandoffM) || touch.standoff_m > limits_.max_standoff_m)
-    return absl::OutOfRangeError(absl::StrFormat(
-        "standoff %.4g mm: must be from %.4g to %.4g mm", touch.standoff_m / kMetresPerMillimetre,
-        kMinStandoffM / kMetresPerMillimetre, limits_.max_standoff_m / kMetresPerMillimetre));
-  if (!(touch.stroke_m > 0))
     return absl::OutOfRangeError(
-        absl::StrFormat("stroke %.4g mm: must be above 0", touch.stroke_m / kMetresPerMillimetre));
+        absl::StrCat("speed ", FileNumber(Unit::kMillimetrePerSecond, touch.speed_m_s),
+                     " mm/s: must be from ", FileNumber(Unit::kMillimetrePerSecond, limits_.min_speed_m_s),
+                     " to ", FileNumber(Unit::kMillimetrePerSecond, limits_.max_speed_m_s), " mm/s"));
+  if (!(touch.standoff_m >= kMinStandoffM) || touch.standoff_m > limits_.max_standoff_m)
+    return absl::OutOfRangeError(absl::StrCat("standoff ", mm(touch.standoff_m), " mm: must be from ",
+                                              mm(kMinStandoffM), " to ", mm(limits_.max_standoff_m), " mm"));
+  if (!(touch.stroke_m > 0))
+    return absl::OutOfRangeError(absl::StrCat("stroke ", mm(touch.stroke_m), " mm: must be above 0"));
   const calibration::UpFace needed = calibration::UpFaceFor(touch.approach);
   if (up_face != needed)
     return absl::FailedPreconditionError(

@@ -120,7 +120,9 @@ absl::StatusOr<std::unique_ptr<AuditLog>> AuditLog::Open(const std::string& path
     return AuditError(path, "cannot be opened", "name a file in a folder that exists and may be written");
   auto log = std::make_unique<FileAuditLog>(path, descriptor);
   TOUCHSTONE_RETURN_IF_ERROR(log->CheckLastLine());
-  TOUCHSTONE_RETURN_IF_ERROR(SyncFolderOf(path));
+  if (const absl::Status synced = SyncFolderOf(path); !synced.ok())
+    return absl::UnavailableError(
+        absl::StrCat("audit log ", path, ": ", synced.message(), "; check its disk"));
   return log;
 }
 

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::gateway::calibration {
@@ -76,8 +78,8 @@ absl::StatusOr<std::vector<FlatTouch>> Whole(const std::vector<FlatTouch>& touch
       return absl::InvalidArgumentError(absl::StrCat("flat touch ", k, " has ", touch.contact_time_s.size(),
                                                      " fingers, the first has ", fingers));
     if (!(touch.speed_m_s > 0) || !std::isfinite(touch.speed_m_s))
-      return absl::InvalidArgumentError(
-          absl::StrFormat("flat touch %d has speed %g m/s; one above 0 is needed", k, touch.speed_m_s));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "flat touch ", k, " has speed ", ShortestNumber(touch.speed_m_s), " m/s; one above 0 is needed"));
     bool all = true;
     for (size_t i = 0; i < fingers; ++i) {
       if (std::isfinite(touch.contact_time_s[i]))
@@ -180,16 +182,14 @@ absl::StatusOr<std::string> CalibratedModelFile(const model::Model& base, const 
   model.effects.erase(std::remove_if(model.effects.begin(), model.effects.end(), replaced),
                       model.effects.end());
   std::vector<std::string> offsets;
-  for (const double offset_m : flat.offset_m)
-    offsets.push_back(model::FileNumber(Unit::kMillimetre, offset_m));
+  for (const double offset_m : flat.offset_m) offsets.push_back(FileNumber(Unit::kMillimetre, offset_m));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       model, model::AddEffect(model, "finger_length",
                               {absl::StrCat("offset_mm=", absl::StrJoin(offsets, ","))}, catalogue));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       model,
       model::AddEffect(model, "gaussian_noise",
-                       {absl::StrCat("sigma_us=", model::FileNumber(Unit::kMicrosecond, flat.sigma_s))},
-                       catalogue));
+                       {absl::StrCat("sigma_us=", FileNumber(Unit::kMicrosecond, flat.sigma_s))}, catalogue));
   return model::FormatModel(model);
 }
 

@@ -229,6 +229,7 @@ class Rig : public source::RigDevice {
   // rig_safety.cpp
   // Closes the latch of Stop; `what` is "by WHOM (WHY)", and is added to what closed it before.
   void Latch(const std::string& what);
+  void LatchLoss(const std::string& what);  // of the arm's controller
   // Latches what the controller's states since the last look tell; `asked`: a motion is being asked for now.
   void LookAtSafety(bool asked = false);
   // A protective or safeguard stop pauses a program on a UR, and the pendant could go on with it: one that was given up
@@ -255,6 +256,8 @@ class Rig : public source::RigDevice {
   std::atomic<uint64_t> stops_{0};    // how often it was stopped: a motion of before a stop never resumes
   mutable std::mutex stop_mutex_;     // of the reason, and of what the journal keeps of it
   std::string stop_reason_;
+  std::string not_released_;  // at the end of it, after a release that could not be written
+  int failed_releases_ = 0;
   std::atomic<uint32_t> motions_{0};  // under way
   mutable std::mutex status_mutex_;
   source::SourceStatus status_;

@@ -21,7 +21,7 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
   TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
   TOUCHSTONE_RETURN_IF_ERROR(
-      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")));
+      unwritten_.SetFacts({{kMotionKey, absl::StrCat(program_id, " a hand that guided the arm")}}, false));
   audit().Write("freedrive", {{"program", std::to_string(program_id)}}).IgnoreError();
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
@@ -43,7 +43,7 @@ absl::Status Rig::Guide(const std::function<void(const arm::ArmState&)>& report,
                          return state.phase == arm::MotionPhase::kDone;
                        });
   --motions_;
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, ""));
+  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kMotionKey, ""}}, true));
   audit().Write("freedrive_ended", {{"why", std::string(status.message())}}).IgnoreError();
   return status;
 }

@@ -9,6 +9,7 @@
 
 #include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
+#include "server/gateway/rig/idle_effector.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/scripted_arm.h"
 
@@ -22,22 +23,6 @@ using arm::SafetyMode;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class FakeEffector final : public effector::Effector {
- public:
-  absl::Status StartCapture(uint32_t, const std::function<absl::Status()>&) override {
-    return absl::OkStatus();
-  }
-  absl::Status EndCapture() override { return absl::OkStatus(); }
-  absl::StatusOr<effector::EffectorTouch> Touch() const override { return absl::NotFoundError("none"); }
-  absl::StatusOr<effector::EffectorTouch> Recall(uint32_t) override { return absl::NotFoundError("none"); }
-  effector::EffectorState State() const override {
-    effector::EffectorState state;
-    state.connected = true;
-    return state;
-  }
-  timing::ClockEstimate Clock() const override { return {}; }
-};
-
 class RigLatch : public testing::Test {
  protected:
   ~RigLatch() override { End(); }
@@ -47,7 +32,7 @@ class RigLatch : public testing::Test {
     auto arm = std::make_unique<ScriptedArm>(parts_.changes.get());
     arm_ = arm.get();
     parts_.arm = std::move(arm);
-    parts_.effector = std::make_unique<FakeEffector>();
+    parts_.effector = std::make_unique<IdleEffector>();
     parts_.planner =
         arm::MotionPlanner::Create("ur3e", arm::MotionLimits(), calibration::Calibration()).value();
     parts_.journal =

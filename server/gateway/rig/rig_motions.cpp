@@ -63,7 +63,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
     return parts_.arm->Ready();
   audit().Write("power_on", {{"robot_mode", arm::RobotModeName(state.robot_mode)}}).IgnoreError();
   // An arm that is told to release its brakes does so by itself, whatever becomes of this process.
-  TOUCHSTONE_RETURN_IF_ERROR(journal().SetMetadata(kMotionKey, "0 powering the arm on"));
+  TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kMotionKey, "0 powering the arm on"}}, false));
   powering_ = true;
   absl::Status status = parts_.arm->PowerOn(guard);
   // The states report it a little later than the dashboard.
@@ -75,9 +75,7 @@ absl::Status Rig::PowerUp(const source::MotionGuard& guard) {
   if (status.ok()) status = parts_.arm->Ready();
   if (status.ok()) zeroed_n_.setZero();
   if (!status.ok()) {
-    if (!parts_.arm->State().ok())
-      Latch(absl::StrCat("by the loss of the arm's controller (while it was powered on: ", status.message(),
-                         ")"));
+    if (!parts_.arm->State().ok()) LatchLoss(absl::StrCat("while it was powered on: ", status.message()));
     // What was taken back is not taken for somebody else's doing.
     const auto off = [this] {
       const absl::StatusOr<arm::ArmState> now = parts_.arm->State();
@@ -190,7 +188,7 @@ absl::Status Rig::MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                               const source::MotionGuard& guard) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t program_id, NextProgramId());
   TOUCHSTONE_RETURN_IF_ERROR(
-      journal().SetMetadata(kMotionKey, absl::StrCat(program_id, " a motion without a touch")));
+      unwritten_.SetFacts({{kMotionKey, absl::StrCat(program_id, " a motion without a touch")}}, false));
   ++motions_;
   const HeartbeatScope beating(heartbeats_.get());
   Program program{program_id, guard, parts_.planner->limits().max_force_n};

@@ -18,8 +18,10 @@ namespace touchstone::gateway {
 namespace {
 
 constexpr double kSafetyLookS = 0.02;  // host time between two looks; no state in between is missed
-constexpr double kArmAnswersS = 10;    // host time that the arm gets at the start
-constexpr double kProgramEndsS = 5;    // host time that a program gets to end after a stop
+constexpr double kWriteAgainS =
+    0.5;  // host time between two tries to write what the journal's disk did not take
+constexpr double kArmAnswersS = 10;  // host time that the arm gets at the start
+constexpr double kProgramEndsS = 5;  // host time that a program gets to end after a stop
 constexpr size_t kMaxReasonBytes = 1000;
 
 std::string UtcNow() {
@@ -59,6 +61,10 @@ void Rig::Latch(const std::string& what) {
   spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);
 }
 
+void Rig::LatchLoss(const std::string& what) {
+  Latch(absl::StrCat("by the loss of the arm's controller (", what, ")"));
+}
+
 void Rig::LookAtSafety(bool asked) {
   std::lock_guard<std::mutex> lock(safety_mutex_);
   for (const std::string& what : watch_.Look(*parts_.arm, {motions_ > 0, powering_, asked})) {
@@ -81,10 +87,15 @@ void Rig::EndPausedProgram() {
 }
 
 void Rig::WatchSafety() {
+  double wrote_s = NowS();
   std::unique_lock<std::mutex> lock(watch_mutex_);
   while (!ending_) {
     lock.unlock();
     LookAtSafety();
+    if (NowS() - wrote_s >= kWriteAgainS) {
+      unwritten_.Flush();
+      wrote_s = NowS();
+    }
     lock.lock();
     options_.clock->WaitFor(lock, watch_ends_, kSafetyLookS, [this] { return ending_; });
   }
@@ -97,7 +108,8 @@ absl::Status Rig::LatchInterruption() {
       TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(
           touch.program_id, absl::StrCat("touch '", touch.id, "' of session '", session, "'")));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string motion, journal().Metadata(kMotionKey));
-  if (motion.empty()) return absl::OkStatus();
+  // Nothing that was found is forgotten below before the latch is on the disk.
+  if (motion.empty()) return unwritten_.SetFacts({}, false);
   const std::pair<std::string, std::string> parts = absl::StrSplit(motion, absl::MaxSplits(' ', 1));
   uint32_t program_id = 0;
   if (!absl::SimpleAtoi(parts.first, &program_id))
@@ -111,8 +123,8 @@ absl::Status Rig::LatchInterruption() {
   } else {
     TOUCHSTONE_RETURN_IF_ERROR(LatchUnlessItEnded(program_id, parts.second));
   }
-  // The latch is on the disk: it need not be found again.
-  return journal().SetMetadata(kMotionKey, "");
+  // With the latch on the disk it need not be found again.
+  return unwritten_.SetFacts({{kMotionKey, ""}}, false);
 }
 
 // Nothing hinges on what the controller's watchdog did when the heartbeats ceased: whether the program still runs, has

@@ -1,4 +1,5 @@
 // Stopping the rig, what releases it, and what keeps it from moving.
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
@@ -75,7 +76,16 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
     std::lock_guard<std::mutex> lock(stop_mutex_);
     if (stops_ != stops) return absl::AbortedError("the rig was stopped again meanwhile: the stop holds");
     // On the disk before anything may move.
-    TOUCHSTONE_RETURN_IF_ERROR(unwritten_.SetFacts({{kStopKey, ""}}, false));
+    if (const absl::Status written = unwritten_.SetFacts({{kStopKey, ""}}, false); !written.ok()) {
+      // It may have reached the disk although it says that it did not. SQLite would not write the same text over it.
+      if (absl::EndsWith(stop_reason_, not_released_))
+        stop_reason_.resize(stop_reason_.size() - not_released_.size());
+      not_released_ =
+          absl::StrCat("; not released at try ", ++failed_releases_, " (the journal's disk failed)");
+      stop_reason_ += not_released_;
+      unwritten_.SetFacts({{kStopKey, stop_reason_}}, true).IgnoreError();
+      return written;
+    }
     stop_reason_.clear();
     stopped_ = false;
   }

@@ -183,8 +183,7 @@ absl::Status Rig::GiveUp(Program* program, const char* what, const absl::Status&
     if (program->hung_s > 0 && NowS() - program->hung_at_s < kAfterHangS)
       Latch(absl::StrCat("by the gateway (it hung for ",
                          ShortestNumber(std::round(10 * program->hung_s) / 10), " s", during, ")"));
-    if (!reachable.ok())
-      Latch(absl::StrCat("by the loss of the arm's controller (", reachable.message(), during, ")"));
+    if (!reachable.ok()) LatchLoss(absl::StrCat(reachable.message(), during));
     if (closing_ && !stopped_)
       Latch(absl::StrCat("by the end of the gateway (it was told to end", during, ")"));
   }

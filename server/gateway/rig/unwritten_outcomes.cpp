@@ -8,9 +8,11 @@
 namespace touchstone::gateway {
 namespace {
 
-// Whether trying again later can help: a full or failing disk, or another program's lock; not a step that is wrong.
-bool MayPass(const absl::Status& status) {
-  return absl::IsResourceExhausted(status) || absl::IsUnavailable(status) || absl::IsDataLoss(status);
+// Whether the journal refused the step itself, so that trying again cannot help: everything else is a disk that is full or
+// fails, or another program's lock.
+bool IsWrong(const absl::Status& status) {
+  return absl::IsNotFound(status) || absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
+         absl::IsAlreadyExists(status);
 }
 
 absl::Status Waiting(absl::string_view id, bool made, absl::string_view why) {
@@ -42,11 +44,12 @@ absl::Status UnwrittenOutcomes::Write(const Outcome& outcome) {
 }
 
 absl::Status UnwrittenOutcomes::WriteOrKeep(Outcome outcome) {
-  const absl::Status written = Write(outcome);
-  if (written.ok() || !MayPass(written)) return written;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  absl::Status written = WriteFacts({});
+  if (written.ok()) written = Write(outcome);
+  if (written.ok() || IsWrong(written)) return written;
   spdlog::error("journal: {}", std::string(written.message()));
   const absl::Status waiting = Waiting(outcome.id, outcome.result.has_value(), written.message());
-  const std::lock_guard<std::mutex> lock(mutex_);
   outcomes_.push_back(std::move(outcome));
   return waiting;
 }
@@ -66,24 +69,27 @@ absl::Status UnwrittenOutcomes::Failed(const std::string& session, const std::st
 
 absl::Status UnwrittenOutcomes::SetFacts(const Facts& facts, bool keep) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const absl::Status written = journal_->SetMetadata(facts);
-  if (!written.ok() && (!keep || !MayPass(written))) return written;
-  for (const auto& [key, value] : facts) {
-    if (written.ok())
-      facts_.erase(key);
-    else
-      facts_[key] = value;
-  }
+  const absl::Status written = WriteFacts(facts);
+  if (!written.ok() && keep)
+    for (const auto& [key, value] : facts) facts_[key] = value;
+  return written;
+}
+
+absl::Status UnwrittenOutcomes::WriteFacts(const Facts& facts) {
+  std::map<std::string, std::string> all = facts_;
+  for (const auto& [key, value] : facts) all[key] = value;
+  if (all.empty()) return absl::OkStatus();
+  const absl::Status written = journal_->SetMetadata(Facts(all.begin(), all.end()));
+  if (written.ok()) facts_.clear();
   return written;
 }
 
 void UnwrittenOutcomes::Flush() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (auto fact = facts_.begin(); fact != facts_.end();)
-    fact = journal_->SetMetadata(fact->first, fact->second).ok() ? facts_.erase(fact) : std::next(fact);
+  if (!WriteFacts({}).ok()) return;
   for (auto outcome = outcomes_.begin(); outcome != outcomes_.end();) {
     const absl::Status written = Write(*outcome);
-    const bool stays = !written.ok() && MayPass(written);
+    const bool stays = !written.ok() && !IsWrong(written);
     if (!written.ok() && !stays) spdlog::error("journal: {}", std::string(written.message()));
     outcome = stays ? std::next(outcome) : outcomes_.erase(outcome);
   }

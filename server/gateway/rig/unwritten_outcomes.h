@@ -1,5 +1,5 @@
-// What a rig has to write down and could not, because the journal's disk was full: kept in memory until there is space.
-// Nothing is told to a client as done before it is on the disk.
+// What a rig has to write down and could not, because the journal's disk was full or failed: kept in memory until it is
+// written. Nothing is told to a client as done before it is on the disk.
 #pragma once
 
 #include <deque>
@@ -30,11 +30,11 @@ class UnwrittenOutcomes {
   absl::Status Done(const std::string& session, const std::string& id, const session::JournalResult& result,
                     const session::JournalSeries* series = nullptr);
   absl::Status Failed(const std::string& session, const std::string& id, const std::string& error);
-  // The journal's SetMetadata; `keep`: what cannot be written is kept. Whatever was kept for these keys is not written
-  // any more.
+  // The journal's SetMetadata; `keep`: what cannot be written is kept. What was kept goes with it, in one step: that a motion
+  // ended never reaches the disk without the latch that it closed. Whatever was kept for these keys is not written any more.
   absl::Status SetFacts(const Facts& facts, bool keep);
 
-  // Writes what is kept, as far as it goes. Before every motion.
+  // Writes what is kept, as far as it goes: facts, then outcomes. Before every motion, and now and then.
   void Flush();
   // OK unless the outcome of this touch is kept; then why it could not be written.
   absl::Status Kept(const std::string& session, const std::string& id) const;
@@ -48,6 +48,7 @@ class UnwrittenOutcomes {
   };
   absl::Status Write(const Outcome& outcome);
   absl::Status WriteOrKeep(Outcome outcome);
+  absl::Status WriteFacts(const Facts& facts);
 
   session::Journal* const journal_;
   mutable std::mutex mutex_;
