@@ -124,7 +124,8 @@ absl::Status AddNextTouches(const selection::Workspace& workspace,
   diagnosis->warnings.push_back(
       left.models.size() < 2
           ? "No touch would tell more than those at hand."
-          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name, ": ",
+          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name,
+                         ": ",
                          engine::DiscriminatingMeasurement({left.models[0].name, left.models[1].name})));
   return absl::OkStatus();
 }
@@ -173,7 +174,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
                               selection::QualityOf(*workspace, selection.initial_model, before));
   selection::SetError(compared_s, &quality);
-  diagnosis.data[0].initial = report::QualityOf(quality);
+  diagnosis.data[0].initial = report::InMicroseconds(quality);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
   report::AddLadder(ladder, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
