@@ -123,10 +123,10 @@ void AddGroups(double initial_us, v1::DataReport* data) {
 }  // namespace
 
 void AddHistograms(double spread_us, v1::DataReport* data) {
-  AddHistogram(v1::Histogram::DESCRIPTOR, "", spread_us, 0.4, data);
+  AddHistogram(v1::Histogram::TOUCH_DESCRIPTOR, "", spread_us, 0.4, data);
   AddHistogram(v1::Histogram::CURVATURE_PER_M, "", 6, -0.5, data);
   for (const std::string& object : data->set().objects()) {
-    AddHistogram(v1::Histogram::DESCRIPTOR, object, spread_us, 0.3, data);
+    AddHistogram(v1::Histogram::TOUCH_DESCRIPTOR, object, spread_us, 0.3, data);
     AddHistogram(v1::Histogram::CURVATURE_PER_M, object, 6, -0.4, data);
   }
 }

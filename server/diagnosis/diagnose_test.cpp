@@ -288,8 +288,7 @@ TEST(Diagnose, ALoudFingerIsNoHeavyTail) {
 TEST(Diagnose, ASigmaThatIsOffByAFactorIsAWrongValueAndOneThatIsNearIsEstimatedAnew) {
   for (const auto& [declared_us, verdict] :
        {std::pair(900.0, engine::Verdict::kWrongValues), std::pair(1500.0, engine::Verdict::kAdequate),
-        std::pair(2700.0, engine::Verdict::kAdequate),
-        std::pair(6000.0, engine::Verdict::kWrongValues)}) {
+        std::pair(2700.0, engine::Verdict::kAdequate), std::pair(6000.0, engine::Verdict::kWrongValues)}) {
     DiagnosisInput input = touches::MakeTestInput({});
     input.model = std::make_shared<const model::Model>(touches::WithEffects(
         model::NominalModel(), {{"gaussian_noise", {absl::StrCat("sigma_us=", declared_us)}}}));
@@ -387,8 +386,7 @@ TEST(Diagnose, SurvivesSetsThatAreTooSmallToSayMuch) {
     input.set = set;
     const absl::StatusOr<report::Diagnosis> report = Diagnose(input, {});
     ASSERT_TRUE(report.ok()) << report.status();
-    EXPECT_EQ(report->verdict,
-              touches < 16 ? engine::Verdict::kTooLittleData : engine::Verdict::kAdequate)
+    EXPECT_EQ(report->verdict, touches < 16 ? engine::Verdict::kTooLittleData : engine::Verdict::kAdequate)
         << touches << ": " << report->summary;
     EXPECT_GE(report->warnings.size(), 1u);
   }

@@ -41,13 +41,14 @@ report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisCo
     const auto o = touches::MakeObservations(input);
     diagnosis.data = {o.ok() ? DataOf(*o, input) : report::DataReport()};
     diagnosis.data[0].session = input.set->origin;
-    const double before_s = problems.empty() ? NAN : problems[0].rmse_before_s;
+    const double before_s = problems.empty() ? NAN : problems[0].error_before;
     if (before_s > 0)
-      diagnosis.data[0].initial = diagnosis.data[0].final = report::InMicroseconds({before_s, before_s, 0});
+      diagnosis.data[0].initial = diagnosis.data[0].final =
+          report::InMicroseconds(report::Quality{before_s, before_s, 0});
   }
   diagnosis.verdict = engine::Verdict::kCheckData;
   for (const engine::DataProblem& problem : problems)
-    diagnosis.data_problems.push_back(report::DataProblemOfTouches(problem));
+    diagnosis.data_problems.push_back(report::InMicroseconds(problem));
   diagnosis.summary = report::Summarize(diagnosis);
   return diagnosis;
 }

@@ -32,7 +32,7 @@ double GreyErrorOf(const DiagnosisInput& input, ThreadPool* pool) {
 
 // The problem with its errors: the model as it was given, on the set as it is and as it would be.
 engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const DiagnosisInput& input,
-                                         double before_grey, ThreadPool* pool) {
+                               double before_grey, ThreadPool* pool) {
   engine::DataProblem problem = mistake.problem;
   problem.error_before = before_grey;
   DiagnosisInput fixed = input;

@@ -124,7 +124,8 @@ absl::Status AddNextTouches(const selection::Workspace& workspace,
   diagnosis->warnings.push_back(
       left.models.size() < 2
           ? "No touch would tell more than those at hand."
-          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name, ": ",
+          : absl::StrCat("No touch of this rig tells ", left.models[0].name, " from ", left.models[1].name,
+                         ": ",
                          engine::DiscriminatingMeasurement({left.models[0].name, left.models[1].name})));
   return absl::OkStatus();
 }
@@ -183,7 +184,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
     TOUCHSTONE_ASSIGN_OR_RETURN(initial, workspace->predictor->Run(*input.initial_model, true, true));
   }
   report::AddResiduals(DescribeBoth(*workspace, initial, touches::Residuals(o, initial), ladder.prediction,
-                                    ladder.residuals, ladder.noise_floor.sigma_s),
+                                    ladder.residuals, ladder.noise_floor.sigma),
                        &diagnosis.data[0]);
   AddSentences(&diagnosis);
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));

@@ -10,9 +10,9 @@
 
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
-#include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis::report {
@@ -23,43 +23,19 @@ enum class DataKind { kTouches, kPhotographs, kBoards, kDistributions };
 // "us", "grey" or "px".
 const char* UnitOf(DataKind kind);
 
-using engine::Quality;  // in the unit of the entry
+// The engine's, with errors and noise in the unit of the entry.
+using engine::NoiseFloor;
+using engine::Quality;
+using Candidate = engine::RankedCandidate;
+using Unexplained = engine::UnexplainedRest;
 
-// As engine::NoiseFloor.
-struct NoiseFloor {
-  double sigma = 0;
-  double lower = 0, upper = 0;  // 95 % interval; 0 if unknown
-  double degrees_of_freedom = 0;
-  bool from_repeats = false;  // false: an upper bound
-  double declared = 0;        // what the model says that it is; 0: it gives no one value
-  // Of repeats that share a course in time, which is not noise; none: they do not.
-  struct TimeStructure {
-    double sigma = 0, z = 0;  // sigma of neighbours in time
-  };
-  std::optional<TimeStructure> time_structure;
-};
-
-// An effect to add, after all earlier ones. Its errors: DataReport::after_step.
-struct Step {
-  std::string effect;
-  engine::EffectScope scope = engine::EffectScope::kRig;
-  std::vector<std::string> equivalent;
-  std::string discriminating_measurement;
-  double probability = 0, gain_nats = 0;
-  std::vector<engine::ParameterEstimate> parameters;
-  std::string meaning, check_on_rig, remedy, words;
+// An effect to add. Its errors: DataReport::after_step.
+struct Step : engine::LadderStep {
   std::vector<DataKind> shown_by;  // of a joint diagnosis
-  model::Model model;  // with it and all before it; without effects where it changes no expectation
 };
 
-// One effect of the catalogue as the only step.
-struct Candidate {
-  std::string effect;
-  engine::EffectScope scope = engine::EffectScope::kRig;
-  engine::CandidateNote note = engine::CandidateNote::kNone;
-  double probability = 0, gain_nats = 0;
-  std::vector<engine::ParameterEstimate> parameters;  // empty unless it was fitted
-  double rmse = 0, heldout_rmse = 0;                     // 0 unless it was fitted
+struct DataProblem : engine::DataProblem {
+  int data_index = 0;  // its errors are in the unit of data[data_index]
 };
 
 // A part of the data in which the model is wrong.
@@ -91,24 +67,6 @@ struct Curve {
   std::vector<Bin> bins;
   double p = 1, p_after = 1;
   std::vector<OfFinger> fingers;
-};
-
-// What no effect of the catalogue explains; as engine::UnexplainedRest.
-struct Unexplained {
-  std::vector<engine::CovariateTest> covariates;
-  std::string formula, formula_yaml, lookup_yaml, words;
-  double rmse = 0, heldout_rmse = 0, heldout_gain = 0;  // with the formula, or the curve
-  std::vector<engine::ParameterEstimate> parameters;
-  std::string nearest_effect, nearest_formula;
-  double nearest_cosine = 0, nearest_formula_share = 0;
-  std::shared_ptr<const model::Effect> lookup;  // null: none
-};
-
-struct DataProblem {
-  engine::ProblemKind kind = engine::ProblemKind::kFingerOrder;
-  std::string detail, words, fix;
-  double error_before = 0, error_after = 0;  // in the unit of data[data_index]
-  int data_index = 0;
 };
 
 // The outlines and single pictures of photographs.

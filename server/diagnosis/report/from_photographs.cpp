@@ -5,7 +5,6 @@
 #include <set>
 #include <vector>
 
-#include "server/diagnosis/report/from_engine.h"
 #include "server/session/emulated.h"
 
 namespace touchstone::diagnosis::report {
@@ -15,19 +14,15 @@ void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
   diagnosis->refitted = found.refitted;
   for (const engine::LadderStep& step : found.steps) {
-    diagnosis->steps.push_back(StepOf(step));
+    diagnosis->steps.push_back({step, {}});
     data.after_step.push_back(step.quality);
   }
   diagnosis->confounded = found.confounded;
   diagnosis->superfluous = found.superfluous;
-  for (const engine::RankedCandidate& candidate : found.candidates)
-    data.candidates.push_back(CandidateOf(candidate, candidate.rmse, candidate.heldout_rmse));
-  if (found.unexplained)
-    data.unexplained =
-        UnexplainedOf(*found.unexplained, found.unexplained->rmse, found.unexplained->heldout_rmse);
+  data.candidates = found.candidates;
+  data.unexplained = found.unexplained;
   for (const engine::DataProblem& problem : found.data_problems)
-    diagnosis->data_problems.push_back(
-        DataProblemOf(problem, problem.error_before, problem.error_after));
+    diagnosis->data_problems.push_back({problem});
   diagnosis->improved_model = found.improved_model;
 }
 
@@ -112,14 +107,9 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   diagnosis.model_hash = found.model_hash;
   diagnosis.data = {DataOf(found, set)};
   DataReport& data = diagnosis.data[0];
-  data.noise_floor.emplace();
-  data.noise_floor->sigma = found.noise_floor.sigma;
-  data.noise_floor->lower = found.noise_floor.lower;
-  data.noise_floor->upper = found.noise_floor.upper;
-  data.noise_floor->degrees_of_freedom = found.noise_floor.degrees_of_freedom;
-  data.noise_floor->from_repeats = found.noise_floor.from_repeats;
-  if (found.initial) data.initial = *found.initial;
-  if (found.final) data.final = *found.final;
+  data.noise_floor = found.noise_floor;
+  data.initial = found.initial;
+  data.final = found.final;
   data.reducible_share = found.reducible_share;
   AddWhere(found, set, &data);
   AddCauses(found, &diagnosis);

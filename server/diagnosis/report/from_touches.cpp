@@ -2,9 +2,6 @@
 
 #include <utility>
 
-#include "server/base/units.h"
-#include "server/diagnosis/report/from_engine.h"
-#include "server/diagnosis/selection/time_structure.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::report {
@@ -65,47 +62,34 @@ DataReport DataOfTouches(const touches::DataSummary& set) {
   return data;
 }
 
-Quality InMicroseconds(const engine::Quality& quality) {
-  return {Microseconds(quality.rmse), Microseconds(quality.heldout_rmse), quality.lack_of_fit_p};
-}
-
-NoiseFloor NoiseFloorOf(const engine::NoiseFloor& from) {
-  NoiseFloor floor;
-  floor.sigma = Microseconds(from.sigma);
-  floor.lower = Microseconds(from.lower);
-  floor.upper = Microseconds(from.upper);
-  floor.degrees_of_freedom = from.degrees_of_freedom;
-  floor.from_repeats = from.from_repeats;
-  floor.declared = Microseconds(from.declared);
-  if (selection::SharesTime(from))
-    floor.time_structure = {Microseconds(from.sigma_without_time), from.time_structure_z};
+NoiseFloor InMicroseconds(NoiseFloor floor) {
+  for (double* time : {&floor.sigma, &floor.lower, &floor.upper, &floor.declared, &floor.sigma_without_time})
+    *time = Microseconds(*time);
   return floor;
 }
 
-DataProblem DataProblemOfTouches(const engine::DataProblem& from) {
-  return DataProblemOf(from, Microseconds(from.error_before), Microseconds(from.error_after));
+DataProblem InMicroseconds(const engine::DataProblem& from) {
+  DataProblem problem{from};
+  problem.error_before = Microseconds(from.error_before);
+  problem.error_after = Microseconds(from.error_after);
+  return problem;
 }
 
 void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
   diagnosis->verdict = ladder.verdict;
-  data.noise_floor = NoiseFloorOf(ladder.noise_floor);
+  data.noise_floor = InMicroseconds(ladder.noise_floor);
   data.final = InMicroseconds(ladder.final);
   data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
   diagnosis->refitted = ladder.refitted;
   for (const engine::LadderStep& step : ladder.steps) {
-    diagnosis->steps.push_back(StepOf(step));
+    diagnosis->steps.push_back({step, {}});
     data.after_step.push_back(InMicroseconds(step.quality));
   }
   diagnosis->superfluous = ladder.superfluous;
   diagnosis->confounded = ladder.confounded;
-  for (const engine::RankedCandidate& candidate : ladder.candidates)
-    data.candidates.push_back(
-        CandidateOf(candidate, Microseconds(candidate.rmse), Microseconds(candidate.heldout_rmse)));
-  if (ladder.unexplained) 
-    data.unexplained =
-        UnexplainedOf(*ladder.unexplained, Microseconds(ladder.unexplained->rmse),
-                      Microseconds(ladder.unexplained->heldout_rmse));
+  for (const Candidate& candidate : ladder.candidates) data.candidates.push_back(InMicroseconds(candidate));
+  if (ladder.unexplained) data.unexplained = InMicroseconds(*ladder.unexplained);
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (ladder.changed) diagnosis->improved_model = ladder.improved;
 }

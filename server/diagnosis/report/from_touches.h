@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "server/base/units.h"
 #include "server/diagnosis/report/diagnosis.h"
 #include "server/diagnosis/selection/ladder.h"
 
@@ -11,9 +12,15 @@ namespace touchstone::diagnosis::report {
 // The set, without errors.
 DataReport DataOfTouches(const touches::DataSummary& set);
 
-Quality InMicroseconds(const engine::Quality& quality);
-NoiseFloor NoiseFloorOf(const engine::NoiseFloor& floor);
-DataProblem DataProblemOfTouches(const engine::DataProblem& problem);
+// What the engine finds in seconds, in us: a quality, a candidate, what is unexplained.
+template <typename Found>
+Found InMicroseconds(Found found) {
+  found.rmse = Microseconds(found.rmse);
+  found.heldout_rmse = Microseconds(found.heldout_rmse);
+  return found;
+}
+NoiseFloor InMicroseconds(NoiseFloor floor);
+DataProblem InMicroseconds(const engine::DataProblem& problem);
 
 // Verdict, causes and errors; `diagnosis` has one entry, with its initial error.
 void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis);

@@ -9,9 +9,9 @@
 #include <iterator>
 #include <utility>
 
+#include "server/diagnosis/engine/candidates.h"
 #include "server/diagnosis/report/message_parts.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/engine/candidates.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {
@@ -109,8 +109,7 @@ void AddUndecided(const joint::SharedEffects& shared, Step* step) {
     if (std::find(replaced.begin(), replaced.end(), step->effect) == replaced.end()) continue;
     step->equivalent.push_back(undecided.effect);
     if (step->discriminating_measurement.empty())
-      step->discriminating_measurement =
-          engine::DiscriminatingMeasurement({step->effect, undecided.effect});
+      step->discriminating_measurement = engine::DiscriminatingMeasurement({step->effect, undecided.effect});
   }
 }
 

@@ -14,8 +14,7 @@ v1::DataReport::Kind ToMessage(DataKind kind) {
   return static_cast<v1::DataReport::Kind>(static_cast<int>(kind) + 1);
 }
 
-v1::Scope ScopeMessage(engine::EffectScope scope,
-                       const std::vector<engine::ParameterEstimate>& parameters) {
+v1::Scope ScopeMessage(engine::EffectScope scope, const std::vector<engine::ParameterEstimate>& parameters) {
   v1::Scope message;
   message.set_kind(scope == engine::EffectScope::kObject ? v1::Scope::OBJECT : v1::Scope::RIG);
   for (const engine::ParameterEstimate& estimate : parameters)

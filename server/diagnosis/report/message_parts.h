@@ -14,8 +14,7 @@ v1::Report::Verdict ToMessage(engine::Verdict verdict);
 v1::DataReport::Kind ToMessage(DataKind kind);
 
 // The objects that it names are those of the values.
-v1::Scope ScopeMessage(engine::EffectScope scope,
-                       const std::vector<engine::ParameterEstimate>& parameters);
+v1::Scope ScopeMessage(engine::EffectScope scope, const std::vector<engine::ParameterEstimate>& parameters);
 
 // Appends to `parameters` of a message.
 void WriteParameters(const std::vector<engine::ParameterEstimate>& parameters,

@@ -82,11 +82,11 @@ images::PhotographDiagnosis FoundInPhotographs() {
   found.verdict = engine::Verdict::kMissingEffects;
   found.images = 36;
   found.objects = {"lat00"};
-  found.noise_floor.sigma_grey = 2;
+  found.noise_floor.sigma = 2;
   found.noise_floor.from_repeats = true;
-  found.initial = images::GreyQuality{12, 12.5, 1e-9};
-  found.final = images::GreyQuality{2.1, 2.2, 0.3};
-  images::PhotographStep step;
+  found.initial = engine::Quality{12, 12.5, 1e-9};
+  found.final = engine::Quality{2.1, 2.2, 0.3};
+  engine::LadderStep step;
   step.effect = "exposure";
   step.probability = 0.99;
   step.quality = *found.final;

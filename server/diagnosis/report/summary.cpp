@@ -10,6 +10,7 @@
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/distributions_summary.h"
+#include "server/diagnosis/selection/time_structure.h"
 #include "server/effects/all_effects.h"
 #include "server/session/emulated.h"
 
@@ -93,8 +94,7 @@ std::string TimeInRepeats(DataKind kind, const NoiseFloor& floor) {
   return absl::StrFormat(
       "Repeats of a touch differ by %s, but touches made one after the other by %s only (z %.1f): something "
       "changes slowly through the session, and that is not noise.",
-      ErrorInWords(kind, floor.sigma), ErrorInWords(kind, floor.time_structure->sigma),
-      floor.time_structure->z);
+      ErrorInWords(kind, floor.sigma), ErrorInWords(kind, floor.sigma_without_time), floor.time_structure_z);
 }
 
 std::string WhatRemains(DataKind kind, const Unexplained& rest) {
@@ -142,7 +142,7 @@ void AddVerdict(const Diagnosis& diagnosis, bool others_in_place, std::vector<st
                                         WordsOf(data.kind).these, " could show."));
       break;
     case engine::Verdict::kUnexplained:
-      if (data.noise_floor && data.noise_floor->time_structure)
+      if (data.noise_floor && selection::SharesTime(*data.noise_floor))
         sentences->push_back(TimeInRepeats(data.kind, *data.noise_floor));
       sentences->push_back(WhatRemains(data.kind, data.unexplained.value_or(Unexplained())));
       break;

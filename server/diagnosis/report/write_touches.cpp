@@ -14,7 +14,7 @@ void WriteWorstTouch(const residuals::WorstTouch& touch, v1::TouchError* message
 
 void WriteHistogram(const residuals::ComparedHistogram& histogram, v1::Histogram* message) {
   message->set_quantity(histogram.quantity == residuals::HistogramQuantity::kDescriptor
-                            ? v1::Histogram::DESCRIPTOR
+                            ? v1::Histogram::TOUCH_DESCRIPTOR
                             : v1::Histogram::CURVATURE_PER_M);
   message->set_object(histogram.object);
   *message->mutable_edges() = {histogram.edges.begin(), histogram.edges.end()};
