@@ -30,8 +30,7 @@ engine::Quality QualityOf(const BoardSet& set, const LensFit& lens, const LensFi
 
 std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
   const auto error = [](const engine::Quality& quality) {
-    return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse,
-                           quality.heldout_rmse);
+    return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse, quality.heldout_rmse);
   };
   if (diagnosis.verdict == engine::Verdict::kTooLittleData)
     return absl::StrFormat(

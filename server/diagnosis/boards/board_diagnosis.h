@@ -34,20 +34,20 @@ inline constexpr double kMinGainNats = 3;
 struct BoardRest {
   std::string name;  // "tangential distortion"
   double gain_nats = 0;
-  engine::Quality quality;                                // with it beside all steps
+  engine::Quality quality;                             // with it beside all steps
   std::vector<std::pair<std::string, double>> values;  // "p1", ...
 };
 
 struct BoardDiagnosis {
   engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
-  int pictures = 0, corners = 0;               // that took part; corners of all pictures
+  int pictures = 0, corners = 0;                  // that took part; corners of all pictures
   std::optional<engine::Quality> initial, final;  // none with kTooLittleData
   engine::NoiseFloor noise;
   std::vector<engine::LadderStep> steps;
   std::vector<engine::ConfoundedEffects> confounded;
   std::vector<BoardRest> rest;
-  int pictures_needed = 0;  // with kTooLittleData
+  int pictures_needed = 0;                     // with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
   std::string summary;
   std::vector<std::string> warnings;

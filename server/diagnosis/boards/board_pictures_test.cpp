@@ -145,7 +145,7 @@ OpenCvLens Calibrate(const BoardSet& set, size_t without) {
   OpenCvLens lens;
   std::vector<cv::Mat> turns, shifts;
   lens.rmse = cv::calibrateCamera(points, corners, cv::Size(set.camera.width_px, set.camera.height_px),
-                                     lens.matrix, lens.distortion, turns, shifts);
+                                  lens.matrix, lens.distortion, turns, shifts);
   return lens;
 }
 

@@ -6,8 +6,8 @@
 #include "server/base/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
-#include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/held_out.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {
@@ -51,7 +51,7 @@ engine::StepwiseSearch BoardSearch::SearchAmong(const Effects& effects) const {
     candidate.nameless = effects::Catalogue().Find(effect->name) == nullptr;
   }
   return engine::StepwiseSearch(experiment_, std::move(candidates), RulesOfBoards(),
-                                   [](const std::string&) {});
+                                [](const std::string&) {});
 }
 
 absl::StatusOr<LensFit> BoardSearch::Measured(engine::Fit fit) const {

@@ -53,7 +53,7 @@ TEST_F(PublicSets, PermutedFingersAreToldAndTheFixMendsTheFile) {
   EXPECT_EQ(problem.kind, ProblemKind::kFingerOrder);
   EXPECT_EQ(problem.detail, "l, m, r hold m, r, l");
   EXPECT_THAT(problem.fix, ::testing::HasSubstr("--finger-order m,r,l -o fixed.csv"));
-  EXPECT_LT(problem.rmse_after_s, 0.02 * problem.rmse_before_s);
+  EXPECT_LT(problem.error_after, 0.02 * problem.error_before);
 }
 
 TEST_F(PublicSets, SwappedObjectsAreTold) {

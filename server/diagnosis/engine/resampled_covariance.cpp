@@ -61,4 +61,4 @@ Eigen::MatrixXd ResampledCovariance(const Experiment& experiment, const Fit& fit
   return covariance;
 }
 
-}  // namespace touchstone::diagnosis::inference
+}  // namespace touchstone::diagnosis::engine

@@ -13,4 +13,4 @@ namespace touchstone::diagnosis::engine {
 // step from the fit each, without a smooth error. The seed draws. Two blocks or fewer: zero.
 Eigen::MatrixXd ResampledCovariance(const Experiment& experiment, const Fit& fit, uint64_t seed);
 
-}  // namespace touchstone::diagnosis::inference
+}  // namespace touchstone::diagnosis::engine

@@ -48,4 +48,4 @@ TEST(ResampledCovariance, FollowsTheSeed) {
 }
 
 }  // namespace
-}  // namespace touchstone::diagnosis::inference
+}  // namespace touchstone::diagnosis::engine

@@ -150,8 +150,8 @@ enum class ProblemKind {
 struct DataProblem {
   ProblemKind kind = ProblemKind::kFingerOrder;
   std::string detail;  // "l <-> m"
-  std::string words;         // a sentence for people, with the evidence
-  std::string fix;           // the command that fixes the file; empty: none does
+  std::string words;   // a sentence for people, with the evidence
+  std::string fix;     // the command that fixes the file; empty: none does
   double error_before = 0,
          error_after = 0;  // of the model as it was given, on the file as it is and would be
 };

@@ -38,8 +38,8 @@ bool HaveRowsForOwnValues(const ObservationModel& observations, const Parameteri
 
 }  // namespace
 
-absl::StatusOr<bool> StepwiseSearch::Accepts(const Fit& before, const Fit& after,
-                                             size_t extensions, bool rare) const {
+absl::StatusOr<bool> StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensions,
+                                             bool rare) const {
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1) ||
       (rare && !HaveRowsForOwnValues(*experiment_.observations, after.model, rules_.min_rows_per_parameter)))
@@ -49,12 +49,9 @@ absl::StatusOr<bool> StepwiseSearch::Accepts(const Fit& before, const Fit& after
   const int added = std::max(after.model.size() - before.model.size(), 1);
   if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
   if (rules_.min_cv_gain_std_errors > 0) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> had,
-                                HeldOutSquaresRefitted(experiment_, before));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> has,
-                                HeldOutSquaresRefitted(experiment_, after));
-    const HeldOutFall fall =
-        FallOfHeldOut(had, has, kNegligible * after.sigma * after.sigma);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> had, HeldOutSquaresRefitted(experiment_, before));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> has, HeldOutSquaresRefitted(experiment_, after));
+    const HeldOutFall fall = FallOfHeldOut(had, has, kNegligible * after.sigma * after.sigma);
     if (!(fall.mean > rules_.min_cv_gain_std_errors * fall.std_error)) return false;
   }
   // Values of single objects cannot be predicted from other objects.

@@ -101,8 +101,7 @@ class StepwiseSearch {
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
   absl::Status Improve(Explanation* explanation) const;  // swaps and removals, as long as there are any
-  absl::StatusOr<bool> Accepts(const Fit& before, const Fit& after, size_t extensions,
-                               bool rare) const;
+  absl::StatusOr<bool> Accepts(const Fit& before, const Fit& after, size_t extensions, bool rare) const;
   double EnterNats(bool rare) const { return rare ? rules_.enter_rare_nats : rules_.enter_nats; }
 
   const Experiment& experiment_;

@@ -166,14 +166,14 @@ TEST_F(StepwiseSearchTest, SetsAValueOfTheInitialModelFreeWhereItIsWrong) {
 
 TEST_F(StepwiseSearchTest, AddsNothingOnWhichPartsDoNotAgreeWhereThatIsAsked) {
   rows.columns["object_push"].tail(150) *= 0.1;  // nearly all of the gain is the first group's
-  rows.measured += kPushM * rows.columns["object_push"];
+  rows.measured += kSearchPushM * rows.columns["object_push"];
   EXPECT_EQ(Names(Search().Run(Nominal(), 0)->fit), std::vector<std::string>{"object_push"});
   SearchRules rules;
   rules.min_cv_gain_std_errors = 2;
   const StepwiseSearch strict(experiment, candidates, rules, [](const std::string&) {});
   EXPECT_TRUE(Names(strict.Run(Nominal(), 0)->fit).empty());
   rows.columns["object_push"].tail(150) *= 10;
-  rows.measured = rows.Random(9, kSigma) + kPushM * rows.columns["object_push"];
+  rows.measured = rows.Random(9, kSearchSigma) + kSearchPushM * rows.columns["object_push"];
   EXPECT_EQ(Names(strict.Run(Nominal(), 0)->fit), std::vector<std::string>{"object_push"});
 }
 

@@ -73,7 +73,7 @@ struct PhotographDiagnosis {
   std::vector<std::string> superfluous;
   std::vector<engine::DataProblem> data_problems;
   std::optional<engine::UnexplainedRest> unexplained;
-  int images_needed = 0;  // with kTooLittleData
+  int images_needed = 0;                       // with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
   std::vector<ProposedPhotograph> next_photographs;
 

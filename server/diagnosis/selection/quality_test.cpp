@@ -43,7 +43,7 @@ TEST(LackOfFit, SeesAMisfitOfTheSizeOfTheNoise) {
   EXPECT_LT(LackOfFitP(set.observations, set.residuals, 0), 1e-6);
 }
 
-TEST(engine::NoiseFloor, IsAnUpperBoundWithoutRepeats) {
+TEST(NoiseFloor, IsAnUpperBoundWithoutRepeats) {
   const touches::SyntheticSet set(5, 48, 1, 0.005, 4);
   const engine::NoiseFloor floor = NoiseFloorOf(set.observations, set.residuals, 3);
   EXPECT_FALSE(floor.from_repeats);
