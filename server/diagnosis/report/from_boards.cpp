@@ -6,8 +6,6 @@
 
 #include <cmath>
 
-#include "server/diagnosis/report/from_engine.h"
-
 namespace touchstone::diagnosis::report {
 namespace {
 
@@ -61,7 +59,7 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
   diagnosis.model_hash = found.model_hash;
   diagnosis.data = {DataOf(found, set)};
   for (const engine::LadderStep& from : found.steps) {
-    Step step = StepOf(from);
+    Step step{from, {}};
     step.words = absl::StrCat(ErrorWords(from.quality), step.words.empty() ? "" : "; ", step.words);
     diagnosis.steps.push_back(std::move(step));
     diagnosis.data[0].after_step.push_back(from.quality);

@@ -129,7 +129,7 @@ TEST(FromBoards, GivesPixelsAndWhatIsLeftWithItsError) {
   found.pictures = 20;
   found.initial = engine::Quality{1.2, 1.3, 1e-9};
   found.final = engine::Quality{0.4, 0.5, 0.01};
-  found.noise.sigma_px = 0.1;
+  found.noise.sigma = 0.1;
   engine::LadderStep step;
   step.effect = "radial_distortion";
   step.quality = *found.final;
