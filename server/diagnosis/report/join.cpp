@@ -98,7 +98,9 @@ Step SharedStepOf(const joint::SharedStep& from) {
 
 // Held-out errors of values that a part of the data gave.
 Quality Unseen(Quality quality, const joint::SharedEffects& shared, DataKind kind) {
-  quality.heldout_rmse = shared.heldout[kind == DataKind::kTouches ? 0 : 1].Of(quality.heldout_rmse);
+  const size_t index = kind == DataKind::kTouches ? 0 : 1;
+  // Where either kind is too little for a shared effect none was looked for.
+  if (index < shared.heldout.size()) quality.heldout_rmse = shared.heldout[index].Of(quality.heldout_rmse);
   return quality;
 }
 
