@@ -13,7 +13,7 @@
 #include "client/cli/test_server.h"
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
-#include "server/diagnosis/joint/joint_test_set.h"
+#include "server/diagnosis/joint_test_set.h"
 #include "server/geometry/mesh_file.h"
 #include "server/session/image_set_file.h"
 

@@ -86,7 +86,7 @@ TEST(FalseBlame, FilesWithoutAMistakeAreNotBlamed) {
     slowest_s = std::max(slowest_s, seconds);
     ASSERT_TRUE(problems.ok()) << problems.status();
     blamed += !problems->empty();
-    EXPECT_TRUE(problems->empty()) << number << ": " << problems->front().kind << ", "
+    EXPECT_TRUE(problems->empty()) << number << ": " << static_cast<int>(problems->front().kind) << ", "
                                    << problems->front().words << "\n  " << TruthInWords(set.truth);
   }
   const auto [low, high] = Interval({blamed, sets});
