@@ -27,10 +27,8 @@ void AddHowWrong(const selection::Workspace& workspace, const std::vector<double
   report::DataReport& data = diagnosis->data[0];
   if (data.count == 0) return;
   const touches::Observations& o = *workspace.observations;
-  const double rmse_s = touches::Rmse(o, residuals);
   data.noise_floor = report::InMicroseconds(selection::NoiseFloorOf(o, residuals, 0));
-  data.initial =
-      report::InMicroseconds(report::Quality{rmse_s, rmse_s, selection::LackOfFitP(o, residuals, 0)});
+  data.initial = report::InMicroseconds(selection::QualityAsCompared(o, residuals));
   data.final = data.initial;
   data.reducible_share = report::ReducibleShare(*data.noise_floor, data.initial->rmse);
 }

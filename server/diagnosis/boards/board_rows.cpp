@@ -60,10 +60,4 @@ std::optional<double> BoardRows::SquaresOfUnseen(const model::Model& model,
   return sum;
 }
 
-std::vector<int> BoardRows::GroupRows() const {
-  std::vector<int> first;
-  for (int group = 0; group <= pictures(); ++group) first.push_back(FirstRowOfGroup(group));
-  return first;
-}
-
 }  // namespace touchstone::diagnosis::boards

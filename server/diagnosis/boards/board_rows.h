@@ -37,7 +37,6 @@ class BoardRows : public engine::ObservationModel {
   std::optional<double> SquaresOfUnseen(const model::Model& model,
                                         const std::vector<int>& rows) const override;
 
-  std::vector<int> GroupRows() const;
   int EliminatedValues() const { return 6 * pictures(); }
 
  private:

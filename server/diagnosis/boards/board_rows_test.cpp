@@ -11,15 +11,7 @@
 namespace touchstone::diagnosis::boards {
 namespace {
 
-const LensVector kLens = LensWith({{kFocal, 0.03},
-                                   {kOffsetX, 4},
-                                   {kOffsetY, -6},
-                                   {kK1, -0.25},
-                                   {kK2, 0.1},
-                                   {kP1, 0.004},
-                                   {kP2, -0.003},
-                                   {kK3, -0.05},
-                                   {kAspect, 0.01}});
+const LensVector kLens = LensOfAllEntries();
 
 // Every effect of a lens, at values that change nothing, free. Their values in the order of LensEntry.
 engine::Parameterization EveryEffect() {

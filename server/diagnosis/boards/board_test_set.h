@@ -67,4 +67,17 @@ inline LensVector LensWith(std::initializer_list<std::pair<LensEntry, double>> v
   return lens;
 }
 
+// Every entry differs from the nominal lens, by about what lenses do.
+inline LensVector LensOfAllEntries() {
+  return LensWith({{kFocal, 0.03},
+                   {kOffsetX, 4},
+                   {kOffsetY, -6},
+                   {kK1, -0.25},
+                   {kK2, 0.1},
+                   {kP1, 0.004},
+                   {kP2, -0.003},
+                   {kK3, -0.05},
+                   {kAspect, 0.01}});
+}
+
 }  // namespace touchstone::diagnosis::boards

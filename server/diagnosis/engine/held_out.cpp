@@ -254,10 +254,7 @@ HeldOutFall FallOfHeldOut(const std::vector<double>& before, const std::vector<d
 absl::StatusOr<std::vector<std::vector<RefitWithoutPart>>> RefitWithoutParts(const Experiment& experiment,
                                                                              const Fit& fit) {
   const ObservationModel& observations = *experiment.observations;
-  std::vector<int> group_rows;
-  for (size_t group = 0; group <= observations.groups().size(); ++group)
-    group_rows.push_back(observations.FirstRowOfGroup(static_cast<int>(group)));
-  const Likelihood plain(group_rows, nullptr, 0, nullptr);
+  const Likelihood plain(observations.GroupRows(), nullptr, 0, nullptr);
   Experiment without_surface = experiment;
   without_surface.likelihood = &plain;
   std::vector<std::vector<RefitWithoutPart>> divisions;

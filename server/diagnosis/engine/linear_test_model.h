@@ -26,11 +26,6 @@ class LinearTestModel : public ObservationModel {
   int GroupOfRow(int row) const override { return row / rows_per_group_; }
   int BlockOfRow(int row) const override { return row / repeats_; }
   double TimeOfRow(int row) const override { return row; }
-  std::vector<int> GroupRows() const {
-    std::vector<int> first;
-    for (int g = 0; g <= static_cast<int>(names_.size()); ++g) first.push_back(FirstRowOfGroup(g));
-    return first;
-  }
 
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
     std::vector<double> predicted(rows(), 0.0);

@@ -24,6 +24,13 @@ class ObservationModel {
   virtual const std::vector<std::string>& groups() const = 0;  // names, as in the model's per-object values
   virtual int FirstRowOfGroup(int group) const = 0;            // group = count: rows()
   virtual int GroupOfRow(int row) const = 0;
+  // First row of each group, then the number of rows.
+  std::vector<int> GroupRows() const {
+    std::vector<int> first;
+    for (int group = 0; group <= static_cast<int>(groups().size()); ++group)
+      first.push_back(FirstRowOfGroup(group));
+    return first;
+  }
   // Rows of one block share their errors (repeats of one pose): they are left out of a fit together.
   virtual int BlockOfRow(int row) const = 0;
   // When the row was measured, in any unit that grows with time: what a stretch of time is, that is left out together.

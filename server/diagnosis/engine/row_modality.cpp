@@ -8,13 +8,9 @@
 namespace touchstone::diagnosis::engine {
 
 RowModality::RowModality(Description description) : description_(std::move(description)) {
-  const ObservationModel& rows = *description_.rows;
-  std::vector<int> first_rows;
-  for (int group = 0; group <= static_cast<int>(rows.groups().size()); ++group)
-    first_rows.push_back(rows.FirstRowOfGroup(group));
-  likelihood_ = std::make_unique<Likelihood>(std::move(first_rows), nullptr, 0, description_.pool);
+  likelihood_ = std::make_unique<Likelihood>(description_.rows->GroupRows(), nullptr, 0, description_.pool);
   likelihood_->SetLeastNoise(description_.noise);
-  experiment_.observations = &rows;
+  experiment_.observations = description_.rows.get();
   experiment_.likelihood = likelihood_.get();
   experiment_.pool = description_.pool;
 }

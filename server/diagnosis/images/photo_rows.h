@@ -60,7 +60,6 @@ class PhotoRows : public engine::ObservationModel {
 
   // Where a smooth error of the objects' albedo enters: a share h of the light of a place.
   const engine::SmoothErrorGeometry& albedo() const { return albedo_; }
-  std::vector<int> GroupRows() const { return first_row_of_group_; }
   int PhotographOfRow(int row) const { return photograph_of_row_[row]; }
   int photographs() const { return static_cast<int>(views_.size()); }
 

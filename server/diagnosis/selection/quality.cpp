@@ -63,6 +63,11 @@ absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::
   return touches::Rmse(o, touches::Residuals(o, prediction));
 }
 
+engine::Quality QualityAsCompared(const touches::Observations& o, const std::vector<double>& residuals) {
+  const double rmse_s = touches::Rmse(o, residuals);
+  return {rmse_s, rmse_s, LackOfFitP(o, residuals, 0)};
+}
+
 void SetError(double rmse_s, engine::Quality* quality) {
   if (quality->rmse > 0) quality->heldout_rmse *= rmse_s / quality->rmse;
   quality->rmse = rmse_s;

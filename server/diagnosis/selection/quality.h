@@ -22,6 +22,10 @@ absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engi
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
+// The same of the model as it was given; `residuals`: of every touch that takes part.
+engine::Quality QualityAsCompared(const touches::Observations& observations,
+                                  const std::vector<double>& residuals);
+
 // Another error, s, of the same fit; the held-out error keeps its ratio to it.
 void SetError(double rmse_s, engine::Quality* quality);
 

@@ -31,18 +31,11 @@ absl::StatusOr<std::unique_ptr<TouchModality>> TouchModality::Make(const Diagnos
 }
 
 absl::StatusOr<engine::Quality> TouchModality::Compare(const model::Model& model) const {
-  return CompareTouches(workspace_->input, model, context_);
-}
-
-absl::StatusOr<engine::Quality> CompareTouches(DiagnosisInput input, const model::Model& model,
-                                               const DiagnosisContext& context) {
-  input.images = nullptr;
+  DiagnosisInput input = workspace_->input;
   input.model = std::make_shared<const model::Model>(TouchPartOf(model));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> workspace, MakeWorkspace(input, context));
-  const touches::Observations& o = *workspace->observations;
-  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
-  const double rmse = touches::Rmse(o, residuals);
-  return engine::Quality{rmse, rmse, LackOfFitP(o, residuals, 0)};
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<Workspace> compared, MakeWorkspace(input, context_));
+  const touches::Observations& o = *compared->observations;
+  return QualityAsCompared(o, touches::Residuals(o, compared->nominal));
 }
 
 }  // namespace touchstone::diagnosis::selection

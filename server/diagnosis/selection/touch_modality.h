@@ -37,8 +37,4 @@ class TouchModality : public engine::Modality {
   SelectionResult found_;
 };
 
-// How good `model` is on the touches of `input`. Errors as MakeWorkspace.
-absl::StatusOr<engine::Quality> CompareTouches(DiagnosisInput input, const model::Model& model,
-                                               const DiagnosisContext& context);
-
 }  // namespace touchstone::diagnosis::selection
