@@ -62,7 +62,6 @@ class JointDiagnoser {
     parts_.model_hash = input_.model->Hash();
     TOUCHSTONE_RETURN_IF_ERROR(Measure(*input_.model, &parts_.initial));
     parts_.shared.in_place = *input_.model;
-    parts_.shared.heldout.resize(2);
     if (!problems.empty()) {
       // A mistake of the touches' file: the photographs beside it are compared.
       parts_.touches = CheckDataReport(touches_, Stretch(context_, 0.5, 0.6), problems);
@@ -189,11 +188,11 @@ absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input,
 absl::StatusOr<report::Diagnosis> DiagnoseJointSet(const DiagnosisInput& input,
                                                    const DiagnosisContext& context) {
   const DiagnosisInput photographs = PhotographsOf(input);
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders,
-                              PhotographBlunders(photographs, context));
-  if (blunders) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> data_errors,
+                              PhotographDataErrors(photographs, context));
+  if (data_errors) {
     TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches, CompareTouches(TouchesOf(input), context));
-    return report::SideBySide(std::move(touches), *std::move(blunders));
+    return report::SideBySide(std::move(touches), *std::move(data_errors));
   }
   if (!input.set->has_poses)
     return absl::InvalidArgumentError(

@@ -1,4 +1,4 @@
-// Touches and photographs of one session in one diagnosis: blunders of either kind, what both see of the objects
+// Touches and photographs of one session in one diagnosis: data errors of either kind, what both see of the objects
 // (joint/), what each kind shows beside that.
 #pragma once
 

@@ -90,10 +90,11 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
   return diagnosis;
 }
 
-absl::StatusOr<report::Diagnosis> BlundersFirst(const DiagnosisInput& input, const DiagnosisContext& context,
-                                                const Engine& engine) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> blunders, PhotographBlunders(input, context));
-  if (blunders) return *std::move(blunders);
+absl::StatusOr<report::Diagnosis> DataErrorsFirst(const DiagnosisInput& input,
+                                                  const DiagnosisContext& context, const Engine& engine) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<report::Diagnosis> data_errors,
+                              PhotographDataErrors(input, context));
+  if (data_errors) return *std::move(data_errors);
   return Reported(input, context, engine);
 }
 
@@ -110,8 +111,8 @@ report::Diagnosis DescribedPhotographs(const DiagnosisInput& input, const Diagno
   return diagnosis;
 }
 
-absl::StatusOr<std::optional<report::Diagnosis>> PhotographBlunders(const DiagnosisInput& input,
-                                                                    const DiagnosisContext& context) {
+absl::StatusOr<std::optional<report::Diagnosis>> PhotographDataErrors(const DiagnosisInput& input,
+                                                                      const DiagnosisContext& context) {
   if (context.progress && !context.progress("checking the data", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
   const std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
@@ -138,14 +139,14 @@ absl::StatusOr<report::Diagnosis> ComparePhotographSet(const DiagnosisInput& inp
 
 absl::StatusOr<report::Diagnosis> DiagnosePhotographSet(const DiagnosisInput& input,
                                                         const DiagnosisContext& context) {
-  return BlundersFirst(input, context, [&](images::Expectation* expectation) {
+  return DataErrorsFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, kDefaultPhotographs, false, context, expectation);
   });
 }
 
 absl::StatusOr<report::Diagnosis> ProposePhotographSet(const DiagnosisInput& input, int max_photographs,
                                                        const DiagnosisContext& context) {
-  return BlundersFirst(input, context, [&](images::Expectation* expectation) {
+  return DataErrorsFirst(input, context, [&](images::Expectation* expectation) {
     return DiagnosedWithNext(input, max_photographs, true, context, expectation);
   });
 }

@@ -1,4 +1,4 @@
-// Photographs from the first check to the report: blunders of the set (checks/), the engine (images/), what differs where
+// Photographs from the first check to the report: data errors of the set (checks/), the engine (images/), what differs where
 // (residuals/).
 #pragma once
 
@@ -22,8 +22,8 @@ absl::StatusOr<report::Diagnosis> ProposePhotographSet(const DiagnosisInput& inp
 
 // Parts of a joint diagnosis: the diagnosis of mistakes of the set, if there are any; and what was found with what differs
 // where.
-absl::StatusOr<std::optional<report::Diagnosis>> PhotographBlunders(const DiagnosisInput& input,
-                                                                    const DiagnosisContext& context);
+absl::StatusOr<std::optional<report::Diagnosis>> PhotographDataErrors(const DiagnosisInput& input,
+                                                                      const DiagnosisContext& context);
 report::Diagnosis DescribedPhotographs(const DiagnosisInput& input, const DiagnosisContext& context,
                                        const images::Expectation& expectation,
                                        images::PhotographDiagnosis* found);

@@ -52,7 +52,7 @@ class Equivalence {
 
   // As probable, or as likely with no more parameters, whatever rigs usually show; with more of them if it is known to
   // hold this effect as a part; or stopped by its bound and nothing else.
-  void Judge(const CompetingFit& other, CompetingEffect* found) const {
+  void Assess(const CompetingFit& other, CompetingEffect* found) const {
     const Fit& fit = whole_.fit;
     const double evidence = found->relative_log_evidence;
     const bool declared = IsDeclaredConfounded(own_, other.name);
@@ -75,8 +75,8 @@ class Equivalence {
   const model::Effect& own_;
 };
 
-absl::StatusOr<SelectedStep> Judge(const StepwiseSearch& search, const Explanation& whole, int index,
-                                   const std::map<std::string, NamelessRival>& rivals) {
+absl::StatusOr<SelectedStep> AssessStep(const StepwiseSearch& search, const Explanation& whole, int index,
+                                        const std::map<std::string, NamelessRival>& rivals) {
   const Fit& fit = whole.fit;
   SelectedStep step;
   step.effect = index;
@@ -92,7 +92,7 @@ absl::StatusOr<SelectedStep> Judge(const StepwiseSearch& search, const Explanati
     CompetingEffect found = {
         other.name, other.per_object, other.object, other.fit.log_evidence - fit.log_evidence, false, false,
         {}};
-    equivalence.Judge(other, &found);
+    equivalence.Assess(other, &found);
     const bool same = other.name == own && other.object == own_object;
     all.push_back(found.relative_log_evidence);
     if (same || found.equivalent) same_or_equivalent.push_back(found.relative_log_evidence);
@@ -117,7 +117,7 @@ absl::StatusOr<std::vector<SelectedStep>> FindCompetitors(
   for (int index = whole.initial_effects; index < static_cast<int>(whole.fit.model.base().effects.size());
        ++index) {
     if (index == nameless) continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(SelectedStep step, Judge(search, whole, index, rivals));
+    TOUCHSTONE_ASSIGN_OR_RETURN(SelectedStep step, AssessStep(search, whole, index, rivals));
     steps.push_back(std::move(step));
   }
   return steps;

@@ -25,7 +25,7 @@ struct CompetingEffect {
   model::Model model;                // the whole model with it
 };
 
-// Something without a name in the place of a named effect: a curve of time, a wander.
+// Something without a name in the place of a named effect: a curve of time, a drift of the fingers.
 struct NamelessRival {
   double ahead_nats = 0;  // log evidence over the effect's own
   std::string words;      // a sentence that says what it is

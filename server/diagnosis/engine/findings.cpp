@@ -32,7 +32,7 @@ class Finder {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps(covariance));
     TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
     TOUCHSTONE_RETURN_IF_ERROR(Rank());
-    Judge();
+    SetVerdict();
     return std::move(found_);
   }
 
@@ -87,7 +87,7 @@ class Finder {
     return absl::OkStatus();
   }
 
-  void Judge() {
+  void SetVerdict() {
     const bool rest = StructureRemains(found_.final, noise_);
     found_.changed = values_wrong_ || !found_.steps.empty();
     found_.verdict = rest                    ? Verdict::kUnexplained

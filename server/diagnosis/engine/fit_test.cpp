@@ -212,7 +212,7 @@ TEST_F(FitTest, HeldOutSquaresOfPartsSumToTheHeldOutErrorAndFitsMadeAnewAgree) {
 }
 
 // Rows whose error the model itself tells where a fit did not see them.
-class JudgesItself : public LinearTestModel {
+class RowsWithTheirOwnUnseenSquares : public LinearTestModel {
  public:
   using LinearTestModel::LinearTestModel;
   std::optional<double> SquaresOfUnseen(const model::Model& model,
@@ -222,7 +222,7 @@ class JudgesItself : public LinearTestModel {
 };
 
 TEST(HeldOut, SquaresAreThoseThatRowsWithValuesOfTheirOwnTell) {
-  JudgesItself rows(4, 5, 2);
+  RowsWithTheirOwnUnseenSquares rows(4, 5, 2);
   rows.columns["object_push"] = rows.Random(1, kColumn);
   rows.measured = kPushM * rows.columns["object_push"];
   const Likelihood likelihood(rows.GroupRows(), nullptr, 0, nullptr);

@@ -36,7 +36,7 @@ absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const Dia
   diagnosis.objects = photographs.objects;
   diagnosis.noise_floor = NoiseFloorOfPhotographs(photographs, expectation->before, context.pool);
   diagnosis.initial = QualityOfPhotographs(photographs, expectation->before, 0, context.pool);
-  JudgeByPixels(photographs, diagnosis.noise_floor, &*diagnosis.initial);
+  AssessByPixels(photographs, diagnosis.noise_floor, &*diagnosis.initial);
   const double floor = diagnosis.noise_floor.sigma, rmse = diagnosis.initial->rmse;
   diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
   if (!diagnosis.noise_floor.from_repeats)

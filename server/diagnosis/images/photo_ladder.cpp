@@ -55,9 +55,9 @@ class PhotoLadder {
     d_.noise_floor = NoiseFloorOfPhotographs(photographs_, best, pool_);
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
     d_.final->heldout_rmse *= selection_.heldout_ratio;
-    for (engine::LadderStep& step : d_.steps) JudgeByPixels(photographs_, d_.noise_floor, &step.quality);
+    for (engine::LadderStep& step : d_.steps) AssessByPixels(photographs_, d_.noise_floor, &step.quality);
     for (engine::Quality* quality : {&*d_.initial, &*d_.final})
-      JudgeByPixels(photographs_, d_.noise_floor, quality);
+      AssessByPixels(photographs_, d_.noise_floor, quality);
     const double floor2 = std::pow(d_.noise_floor.sigma, 2), initial2 = std::pow(d_.initial->rmse, 2);
     d_.reducible_share = initial2 > floor2 ? 1 - floor2 / initial2 : 0;
     const bool expectations_changed = changed_;
@@ -69,7 +69,7 @@ class PhotoLadder {
                                [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
                                  return SetErrors(fit, candidate);
                                }));
-    TOUCHSTONE_RETURN_IF_ERROR(JudgeRest());
+    TOUCHSTONE_RETURN_IF_ERROR(AssessRest());
     DoubtSteps();
     d_.verdict = d_.unexplained      ? engine::Verdict::kUnexplained
                  : !d_.steps.empty() ? engine::Verdict::kMissingEffects
@@ -190,7 +190,7 @@ class PhotoLadder {
   }
 
   // A structure that no named effect explains.
-  absl::Status JudgeRest() {
+  absl::Status AssessRest() {
     const engine::Likelihood& likelihood = *selection_.fine.likelihood;
     const double q = likelihood.Gram(engine::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);

@@ -120,7 +120,7 @@ engine::Quality QualityOfPhotographs(const Photographs& photographs,
   return quality;
 }
 
-void JudgeByPixels(const Photographs& p, const engine::NoiseFloor& floor, engine::Quality* quality) {
+void AssessByPixels(const Photographs& p, const engine::NoiseFloor& floor, engine::Quality* quality) {
   const double freedom = kEfficiency * p.width() * p.height() * p.size();
   const double ratio = quality->rmse / (kContours * floor.sigma);
   if (!(floor.sigma > 0) || ratio <= 1) return;

@@ -33,7 +33,8 @@ engine::Quality QualityOfPhotographs(const Photographs& photographs,
 
 // The same of single pixels, whose error at contours patches hardly count: lowers quality->lack_of_fit_p where the error
 // lies farther above the floor than contours that were sampled at pixel centres explain (a tenth).
-void JudgeByPixels(const Photographs& photographs, const engine::NoiseFloor& floor, engine::Quality* quality);
+void AssessByPixels(const Photographs& photographs, const engine::NoiseFloor& floor,
+                    engine::Quality* quality);
 
 // The error on photographs that a fit did not see over the error on the same photographs where it saw them, over all
 // their pixels; at least 1. The fit is made anew without each object, without each fifth of the poses and without each

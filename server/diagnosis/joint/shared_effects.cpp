@@ -136,7 +136,7 @@ class SharedFinder {
 
   // What explains as much as the best, with a shared effect in the place of others.
   void FindUndecided(const SharedSelection& selection) {
-    for (const Explained& tried : selection.tried) {
+    for (const JointExplanation& tried : selection.tried) {
       if (tried.fit.log_evidence < selection.best.fit.log_evidence - engine::SearchRules().equivalent_nats)
         continue;
       for (const SharedEffect& effect : tried.shared) {
@@ -154,7 +154,7 @@ class SharedFinder {
 
   // The joint fit to all rows, where a kind's values are taken from others than its search; the noise of each kind judged by
   // the scatter between its blocks.
-  absl::StatusOr<JointFit> Polish(const Explained& best) const {
+  absl::StatusOr<JointFit> Polish(const JointExplanation& best) const {
     std::vector<Part> parts = PartsOf(sides_, best);
     std::vector<engine::FinalRows> rows;
     for (const Side& side : sides_) {
@@ -188,16 +188,16 @@ class SharedFinder {
       step.scope = shared.instance.per_object ? engine::EffectScope::kObject : engine::EffectScope::kRig;
       if (!shared.object.empty()) step.words = absl::StrCat("on ", shared.object, " only");
       DescribeValues(shared, fit, &step);
-      Judge(selection, shared, &step);
+      AssessStep(selection, shared, &step);
       in_place.push_back(Rounded(WithValues(shared, fit), fit));
       step.model = InPlace(given_, in_place);
       found_.steps.push_back(std::move(step));
     }
     found_.in_place = found_.steps.back().model;
-    return JudgeUnseen(selection.best.fit, fit);
+    return MeasureHeldOut(selection.best.fit, fit);
   }
 
-  absl::Status JudgeUnseen(const JointFit& found, const JointFit& polished) {
+  absl::Status MeasureHeldOut(const JointFit& found, const JointFit& polished) {
     for (const Side& side : sides_) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const engine::HeldOutError error,
                                   side.modality->HeldOut(found.fits[side.kind], polished.fits[side.kind]));
@@ -266,15 +266,15 @@ class SharedFinder {
   }
 
   // How probable, which kinds show it, what else would do.
-  void Judge(const SharedSelection& selection, const SharedEffect& shared, SharedStep* step) const {
+  void AssessStep(const SharedSelection& selection, const SharedEffect& shared, SharedStep* step) const {
     const double best = selection.best.fit.log_evidence;
     std::vector<double> all, same;
     double without = selection.none.fit.log_evidence;
-    const auto has = [](const Explained& explained, const std::string& name) {
+    const auto has = [](const JointExplanation& explained, const std::string& name) {
       return std::any_of(explained.shared.begin(), explained.shared.end(),
                          [&](const SharedEffect& effect) { return effect.name() == name; });
     };
-    const auto consider = [&](const Explained& explained) {
+    const auto consider = [&](const JointExplanation& explained) {
       const double evidence = explained.fit.log_evidence;
       all.push_back(evidence);
       if (has(explained, shared.name())) {
@@ -289,7 +289,7 @@ class SharedFinder {
       for (const std::string& own : OwnBeside(explained, selection.best)) step->equivalent.push_back(own);
     };
     consider(selection.none);
-    for (const Explained& explained : selection.tried) consider(explained);
+    for (const JointExplanation& explained : selection.tried) consider(explained);
     std::sort(step->equivalent.begin(), step->equivalent.end());
     step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()),
                            step->equivalent.end());

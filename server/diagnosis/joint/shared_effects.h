@@ -53,10 +53,11 @@ struct Undecided {
 struct SharedEffects {
   std::vector<SharedStep> steps;
   std::vector<Undecided> undecided;
-  std::vector<Conflict> conflicts;            // if there are any, there is no step
-  model::Model in_place;                      // the given model with the steps
-  std::vector<engine::HeldOutError> heldout;  // by kind, of the values that the steps give
-  std::vector<std::string> settled;           // names of all shared effects, found or not
+  std::vector<Conflict> conflicts;  // if there are any, there is no step
+  model::Model in_place;            // the given model with the steps
+  std::vector<engine::HeldOutError>
+      heldout;                       // by kind, of the values that the steps give; empty: nothing was fitted
+  std::vector<std::string> settled;  // names of all shared effects, found or not
 };
 
 // `kinds`: at least two, each with enough data for a verdict of its own. `given`: the model with the effects of every kind.

@@ -12,8 +12,8 @@ namespace touchstone::diagnosis::joint {
 namespace {
 
 constexpr int kPasses = 2;          // of values and what stands beside them
-constexpr int kMaxTried = 3;        // forms per round, beside those that either kind names by itself
-constexpr double kWorthTrying = 3;  // nats that either kind, or both together, expect of a form
+constexpr int kMaxTried = 3;        // forms per round, beside those that a kind names by itself
+constexpr double kWorthTrying = 3;  // nats that one kind, or all together, expect of a form
 constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
 constexpr int kMaxShared = 6;       // effects
 
@@ -55,7 +55,7 @@ SharedEffect FormOf(const Side& side, const engine::Extension& extension) {
 }
 
 // Every form that the explanation lacks, most promising first.
-absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const Explained& so_far) {
+absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const JointExplanation& so_far) {
   std::map<std::string, Form> forms;
   for (const Side& side : sides) {
     const engine::Fit& fit = so_far.fit.fits[side.kind];
@@ -100,7 +100,7 @@ absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::vector<OwnEffect
                                  std::vector<Form>* forms) {
   if (std::count_if(own.begin(), own.end(), [](const OwnEffects& e) { return e.size() > 0; }) < 2)
     return absl::OkStatus();
-  Explained bare;
+  JointExplanation bare;
   bare.own.resize(sides.size());
   TOUCHSTONE_ASSIGN_OR_RETURN(bare.fit, FitJointly(PartsOf(sides, bare)));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Form> hidden, ListForms(sides, bare));
@@ -115,7 +115,7 @@ absl::Status AddFormsHiddenByOwn(const Sides& sides, const std::vector<OwnEffect
 }
 
 // Whether one kind, at the joint values, predicts blocks better that were left out.
-bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained& after) {
+bool PredictsUnseen(const Sides& sides, const JointExplanation& before, const JointExplanation& after) {
   for (const Side& side : sides) {
     const double was = engine::HeldOutRmseByBlock(side.modality->experiment(), before.fit.fits[side.kind]);
     const double is = engine::HeldOutRmseByBlock(side.modality->experiment(), after.fit.fits[side.kind]);
@@ -124,10 +124,11 @@ bool PredictsUnseen(const Sides& sides, const Explained& before, const Explained
   return false;
 }
 
-bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& after, size_t forms) {
+bool IsWorthIt(const Sides& sides, const JointExplanation& before, const JointExplanation& after,
+               size_t forms) {
   const bool rare = after.shared.back().rare;
   const double gain = after.fit.log_evidence - before.fit.log_evidence;
-  // Where it takes the place of what either kind named by itself, nothing is added but one cause put for others.
+  // Where it takes the place of what a kind named by itself, nothing is added but one cause put for others.
   int replaced = 0;
   for (size_t kind = 0; kind < before.own.size(); ++kind)
     replaced += before.own[kind].size() - after.own[kind].size();
@@ -146,7 +147,7 @@ bool IsWorthIt(const Sides& sides, const Explained& before, const Explained& aft
 
 }  // namespace
 
-std::vector<std::string> OwnBeside(const Explained& one, const Explained& other) {
+std::vector<std::string> OwnBeside(const JointExplanation& one, const JointExplanation& other) {
   std::vector<std::string> beside;
   for (size_t kind = 0; kind < one.own.size(); ++kind) {
     const std::vector<std::string> others = other.own[kind].Names();
@@ -156,19 +157,19 @@ std::vector<std::string> OwnBeside(const Explained& one, const Explained& other)
   return beside;
 }
 
-std::vector<Part> PartsOf(const Sides& sides, const Explained& explained) {
+std::vector<Part> PartsOf(const Sides& sides, const JointExplanation& explained) {
   std::vector<Part> parts;
   for (const Side& side : sides)
     parts.push_back({&side.modality->experiment(), side.Free(explained.shared, explained.own[side.kind]), 1});
   return parts;
 }
 
-absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                      std::vector<OwnEffects> own) {
-  Explained best{std::move(shared), std::move(own), {}};
+absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
+                                             std::vector<OwnEffects> own) {
+  JointExplanation best{std::move(shared), std::move(own), {}};
   TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
   for (int pass = 0; pass < kPasses; ++pass) {
-    Explained next = best;
+    JointExplanation next = best;
     for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
     bool same = true;
     for (const Side& side : sides) {
@@ -198,14 +199,14 @@ absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Form> forms, ListForms(sides, selection.best));
     if (round == 0) TOUCHSTONE_RETURN_IF_ERROR(AddFormsHiddenByOwn(sides, own, &forms));
     int chosen = -1;
-    std::vector<Explained> tried;
+    std::vector<JointExplanation> tried;
     for (const Form& form : forms) {
       std::vector<SharedEffect> shared = selection.best.shared;
       shared.push_back(form.effect);
-      TOUCHSTONE_ASSIGN_OR_RETURN(Explained with, ExplainWith(sides, shared, selection.best.own));
-      // What either kind shows by itself may have stood in for the effect.
+      TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation with, ExplainWith(sides, shared, selection.best.own));
+      // What each kind shows by itself may have stood in for the effect.
       for (const std::vector<OwnEffects>& start : {own, std::vector<OwnEffects>(sides.size())}) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(Explained afresh, ExplainWith(sides, shared, start));
+        TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh, ExplainWith(sides, shared, start));
         if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
       }
       tried.push_back(std::move(with));

@@ -8,29 +8,29 @@
 namespace touchstone::diagnosis::joint {
 
 // Shared effects in some form, with the best that each kind shows beside them.
-struct Explained {
+struct JointExplanation {
   std::vector<SharedEffect> shared;  // at the joint values
   std::vector<OwnEffects> own;       // by kind
   JointFit fit;
 };
 
 struct SharedSelection {
-  Explained best;
-  Explained none;                // without any shared effect
-  std::vector<Explained> tried;  // every other form
+  JointExplanation best;
+  JointExplanation none;                // without any shared effect
+  std::vector<JointExplanation> tried;  // every other form
 };
 
 // Effects of one kind alone that the one has and the other does not.
-std::vector<std::string> OwnBeside(const Explained& one, const Explained& other);
+std::vector<std::string> OwnBeside(const JointExplanation& one, const JointExplanation& other);
 
 using Sides = std::vector<Side>;
 
 // The shared effects, fitted jointly, with whatever each kind shows beside them.
-absl::StatusOr<Explained> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                      std::vector<OwnEffects> own);
+absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
+                                             std::vector<OwnEffects> own);
 
 absl::StatusOr<SharedSelection> SearchShared(const Sides& sides);
 
-std::vector<Part> PartsOf(const Sides& sides, const Explained& explained);
+std::vector<Part> PartsOf(const Sides& sides, const JointExplanation& explained);
 
 }  // namespace touchstone::diagnosis::joint

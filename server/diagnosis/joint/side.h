@@ -64,7 +64,7 @@ struct Side {
   std::vector<SharedEffect> SharedOf(const engine::Fit& fit) const;
 };
 
-// A shared effect with the values of a joint fit, of both kinds' objects.
+// A shared effect with the values of a joint fit, of every kind's objects.
 SharedEffect WithValues(SharedEffect shared, const JointFit& fit);
 
 // The index of the effect in the model of a fit; -1: it is not there.
