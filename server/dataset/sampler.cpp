@@ -43,8 +43,7 @@ absl::Status TouchSampler::Sample(absl::Span<const uint64_t> indices, const std:
                                   Workspace* workspace, const Sink& sink) const {
   if (!simulator_.needs_previous_press()) return Run(indices, Until::kSensor, {}, cancelled, workspace, sink);
 
-  // The touch before is the sample before: its motion is simulated first. Its own history does not reach its
-  // press, but through a formula, where it counts as none.
+  // The touch before is the sample before: its motion is simulated first (TouchSimulator::Run).
   const int fingers = specification_.model->fingers;
   std::vector<uint64_t>& previous = workspace->previous_indices;
   std::vector<uint32_t> slot_of_previous;

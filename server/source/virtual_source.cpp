@@ -12,15 +12,32 @@ namespace {
 
 constexpr size_t kTouchBlock = 1024;
 
-// How many touches from `begin` on go through the simulation together. A model with history sees one touch after
-// the other; touches of different strokes never share a batch.
-size_t BlockSize(const std::vector<touch::CommandedTouch>& touches, size_t begin,
-                 const touch::TouchSimulator& simulator) {
+// How many touches from `begin` on go through the simulation together: those of different strokes never share a batch.
+size_t BlockSize(const std::vector<touch::CommandedTouch>& touches, size_t begin) {
   size_t count = 1;
-  while (!simulator.needs_previous_press() && count < kTouchBlock && begin + count < touches.size() &&
+  while (count < kTouchBlock && begin + count < touches.size() &&
          touches[begin + count].stroke_m == touches[begin].stroke_m)
     ++count;
   return count;
+}
+
+absl::Status FillBlock(const TouchRequest& request, const ServedObject& object, size_t begin, int count,
+                       const touch::TouchSimulator& simulator, effects::TouchBatch* batch) {
+  simulator.Prepare(count, batch);
+  batch->surface = object.surface;
+  batch->seed = request.seed;
+  batch->stroke_m = request.touches[begin].stroke_m;
+  for (int k = 0; k < count; ++k) {
+    const touch::CommandedTouch& touch = request.touches[begin + k];
+    touch::SetTouch(touch, request.first_index + begin + k, k, batch);
+    if (begin + k > 0)
+      batch->pause_s[k] =
+          touch::PauseBetween(request.touches[begin + k - 1].session_time_s, touch.session_time_s);
+    if (!simulator.needed_covariates().empty())
+      TOUCHSTONE_RETURN_IF_ERROR(touch::SetCovariates(simulator.needed_covariates(), touch,
+                                                      absl::StrCat("touches[", begin + k, "]"), k, batch));
+  }
+  return absl::OkStatus();
 }
 
 void AppendRows(const effects::TouchBatch& batch, TouchResults* results) {
@@ -90,28 +107,24 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
   TouchResults results;
   results.fingers = model->fingers;
   results.model = model;
-  std::vector<double> press_m(model->fingers, 0.0);  // of the touch before
+  std::vector<double> press_m(model->fingers, 0.0);  // of the touch before the block
   for (size_t begin = 0; begin < request.touches.size();) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
-    const int count = static_cast<int>(BlockSize(request.touches, begin, simulator));
-    simulator.Prepare(count, &batch);
-    batch.surface = object.surface;
-    batch.seed = request.seed;
-    batch.stroke_m = request.touches[begin].stroke_m;
-    for (int k = 0; k < count; ++k) {
-      const touch::CommandedTouch& touch = request.touches[begin + k];
-      touch::SetTouch(touch, request.first_index + begin + k, k, &batch);
-      if (begin + k > 0)
-        batch.pause_s[k] =
-            touch::PauseBetween(request.touches[begin + k - 1].session_time_s, touch.session_time_s);
-      if (!simulator.needed_covariates().empty())
-        TOUCHSTONE_RETURN_IF_ERROR(touch::SetCovariates(simulator.needed_covariates(), touch,
-                                                        absl::StrCat("touches[", begin + k, "]"), k, &batch));
+    const int count = static_cast<int>(BlockSize(request.touches, begin));
+    TOUCHSTONE_RETURN_IF_ERROR(FillBlock(request, object, begin, count, simulator, &batch));
+    if (simulator.needs_previous_press()) {
+      TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
+      std::vector<double> previous_press_m(batch.press_m.size());
+      for (int k = 0; k < count; ++k)
+        for (int finger = 0; finger < model->fingers; ++finger)
+          previous_press_m[batch.At(finger, k)] =
+              k > 0 ? batch.press_m[batch.At(finger, k - 1)] : press_m[finger];
+      for (int finger = 0; finger < model->fingers; ++finger)
+        press_m[finger] = batch.press_m[batch.At(finger, count - 1)];
+      TOUCHSTONE_RETURN_IF_ERROR(FillBlock(request, object, begin, count, simulator, &batch));
+      batch.previous_press_m = std::move(previous_press_m);
     }
-    if (simulator.needs_previous_press()) batch.previous_press_m = press_m;  // one touch
     TOUCHSTONE_RETURN_IF_ERROR(simulator.Run(&batch, &workspace));
-    for (int finger = 0; finger < model->fingers; ++finger)
-      press_m[finger] = batch.press_m[batch.At(finger, count - 1)];
     AppendRows(batch, &results);
     begin += count;
   }

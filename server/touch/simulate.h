@@ -40,10 +40,11 @@ class TouchSimulator {
   // Stages pose, contact and motion. Fails if a formula gives no finite number or a covariate is missing.
   absl::Status RunToMotion(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
-  // Stage sensor; previous_press_m must be filled before where it is needed.
+  // Stage sensor.
   absl::Status RunSensor(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
-  // Both.
+  // Both. Where needs_previous_press(), previous_press_m is given: press_m of the session's previous touch, whose
+  // own previous_press_m was 0. So a touch depends on the one before it and on no other.
   absl::Status Run(effects::TouchBatch* batch, TouchWorkspace* workspace) const;
 
  private:

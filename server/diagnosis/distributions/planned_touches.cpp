@@ -80,15 +80,22 @@ absl::StatusOr<std::vector<double>> SimulatePlannedTouches(std::shared_ptr<const
   batch.surface = std::move(surface);
   batch.seed = drawn.seed;
   // All together in the order of the session, so that a press reaches the next touch.
-  simulator.Prepare(static_cast<int>(count), &batch);
-  for (size_t k = 0; k < count; ++k) Fill(drawn.touches, drawn.numbers, k, static_cast<int>(k), &batch);
-  TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
-  for (size_t k = 1; k < count; ++k)
-    for (int i = 0; i < fingers; ++i) {
-      const double press_m = batch.press_m[batch.At(i, static_cast<int>(k) - 1)];
-      batch.previous_press_m[batch.At(i, static_cast<int>(k))] = std::isnan(press_m) ? 0 : press_m;
-    }
-  TOUCHSTONE_RETURN_IF_ERROR(simulator.RunSensor(&batch, &workspace));
+  const auto fill = [&] {
+    simulator.Prepare(static_cast<int>(count), &batch);
+    for (size_t k = 0; k < count; ++k) Fill(drawn.touches, drawn.numbers, k, static_cast<int>(k), &batch);
+  };
+  fill();
+  if (simulator.needs_previous_press()) {
+    TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
+    std::vector<double> previous_press_m(count * fingers, 0.0);
+    for (size_t k = 1; k < count; ++k)
+      for (int i = 0; i < fingers; ++i)
+        previous_press_m[batch.At(i, static_cast<int>(k))] =
+            batch.press_m[batch.At(i, static_cast<int>(k) - 1)];
+    fill();
+    batch.previous_press_m = std::move(previous_press_m);
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(simulator.Run(&batch, &workspace));
   std::vector<double> time_s(count * fingers, NAN);
   for (size_t k = 0; k < count; ++k)
     for (int i = 0; i < fingers; ++i)

@@ -152,7 +152,6 @@ class Predictor::Task {
   }
 
   bool SimulateToMotion(const Block& block, effects::TouchBatch* batch, touch::TouchWorkspace* workspace) {
-    predictor_.Fill(block, simulator_, batch);
     absl::Status ran = simulator_.RunToMotion(batch, workspace);
     if (!ran.ok()) Fail(ran);
     return ran.ok();
@@ -164,6 +163,7 @@ class Predictor::Task {
     predictor_.ForBlocks(blocks_, [this](const Block& block) {
       thread_local effects::TouchBatch batch;
       thread_local touch::TouchWorkspace workspace;
+      predictor_.Fill(block, simulator_, &batch);
       if (!SimulateToMotion(block, &batch, &workspace)) return;
       for (size_t t = 0; t < block.touches.size(); ++t)
         for (int i = 0; i < o_.fingers; ++i)
@@ -178,12 +178,13 @@ class Predictor::Task {
   void Simulate(const Block& block) {
     thread_local effects::TouchBatch batch;
     thread_local touch::TouchWorkspace workspace;
-    if (!SimulateToMotion(block, &batch, &workspace)) return;
+    predictor_.Fill(block, simulator_, &batch);
     for (size_t t = 0; t < block.touches.size() && simulator_.needs_previous_press(); ++t) {
       const int previous = o_.previous[block.touches[t]];
       for (int i = 0; i < o_.fingers && previous >= 0; ++i)
         batch.previous_press_m[batch.At(i, static_cast<int>(t))] = presses_m_[Entry(previous, i)];
     }
+    if (!SimulateToMotion(block, &batch, &workspace)) return;
     if (absl::Status ran = simulator_.RunSensor(&batch, &workspace); !ran.ok()) return Fail(std::move(ran));
     for (size_t t = 0; t < block.touches.size(); ++t) Keep(batch, static_cast<int>(t), block.touches[t]);
   }

@@ -65,6 +65,7 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
   plan.faces.rounds = rig.rounds;
   plan.touch_interval_s = 9;
   std::vector<double> previous_press_m(3, 0.0);
+  effects::TouchBatch batch;
   for (size_t object = 0; object < rig.objects.size(); ++object) {
     const auto surface = TestSurface(rig.objects[object]);
     input.surfaces[rig.objects[object]] = surface;
@@ -74,14 +75,21 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
     touch::TouchWorkspace workspace;
     for (uint64_t number = 0; number < generator->Count(); ++number) {
       const touch::CommandedTouch touch = touch::TouchOfPlan(plan, *generator, number, 0);
-      effects::TouchBatch batch;
-      simulator.Prepare(1, &batch);
-      batch.surface = surface;
-      batch.seed = rig.seed;
-      touch::SetTouch(touch, touch.speed_m_s, 9.0 * set->touch.size(), set->touch.size(), 0, &batch);
+      const auto fill = [&] {
+        simulator.Prepare(1, &batch);
+        batch.surface = surface;
+        batch.seed = rig.seed;
+        touch::SetTouch(touch, touch.speed_m_s, plan.touch_interval_s * set->touch.size(), set->touch.size(),
+                        0, &batch);
+        if (!set->touch.empty()) batch.pause_s[0] = plan.touch_interval_s;
+      };
+      fill();
+      EXPECT_TRUE(simulator.RunToMotion(&batch, &workspace).ok());
+      const std::vector<double> press_m = batch.press_m;
+      fill();
       batch.previous_press_m = previous_press_m;
       EXPECT_TRUE(simulator.Run(&batch, &workspace).ok());
-      previous_press_m = batch.press_m;
+      previous_press_m = press_m;
       set->touch.push_back(set->touch.size());
       set->object.push_back(static_cast<int>(object));
       set->target_m.push_back(touch.target_m);
