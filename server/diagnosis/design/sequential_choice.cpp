@@ -16,8 +16,19 @@ struct ModelPair {
   double separation() const { return 0.5 * (competing.separation() + best.separation()); }
   double Gain(int k) const { return 0.5 * (competing.Gain(k) + best.Gain(k)); }
   // A pair that is as good as discriminated counts less and less.
-  double RelativeGain(int k) const { return Gain(k) / (1 + separation()); }
+  double RelativeGain(int k) const { return tied ? 0 : Gain(k) / (1 + separation()); }
+
+  bool tied = false;  // no measurement tells the two apart: numbers of measurements would be made up
 };
+
+// Whether all candidates together would reach no verdict, whichever of the two is true. Models that imitate each other differ
+// by what they have fitted of the present noise, and that does not grow with the candidates.
+bool IsTied(ModelPair pair, const LinearisedPrediction& best, size_t candidates) {
+  for (size_t k = 0; k < candidates; ++k)
+    if (best.predicted[k].allFinite())
+      pair.competing.Add(static_cast<int>(k)), pair.best.Add(static_cast<int>(k));
+  return 0.5 * std::min(pair.competing.separation(), pair.best.separation()) < kVerdictNats;
+}
 
 // Chooses measurements one after the other, spread over the objects.
 class MeasurementChooser {
@@ -58,6 +69,7 @@ MeasurementChooser::MeasurementChooser(const std::vector<std::string>& names,
   for (size_t j = alone() ? 0 : 1; j < names.size(); ++j)
     pairs_.push_back({SequentialRefit(&predictions[j], &predictions[0]),
                       SequentialRefit(&predictions[0], &predictions[j])});
+  for (ModelPair& pair : pairs_) pair.tied = !alone() && IsTied(pair, predictions[0], objects.size());
 }
 
 double MeasurementChooser::Worth(int k) const {
