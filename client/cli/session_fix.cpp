@@ -24,7 +24,7 @@ struct FixOptions {
   std::vector<std::string> rename_objects, move_objects;
   double scale_times = 1, scale_lengths = 1, scale_targets = 1, scale_standoff = 1, scale_speed = 1;
   int shift_rows = 0;
-  bool reverse_lateral = false, reverse_approach = false, drop_duplicates = false;
+  bool reverse_lateral = false, reverse_approach = false, drop_duplicates = false, drop_stale = false;
   ImageSetFixOptions images;
 };
 
@@ -128,6 +128,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   TOUCHSTONE_RETURN_IF_ERROR(ReadFingers(options, fingers, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &fix));
   fix.drop_duplicates = options.drop_duplicates;
+  fix.drop_stale = options.drop_stale;
   fix.shift_rows = options.shift_rows;
   fix.scale_times = options.scale_times;
   fix.scale_targets = options.scale_lengths * options.scale_targets;
@@ -145,7 +146,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
 // What a folder of photographs and a measurement file both may need, for a folder.
 absl::Status RunFolderFix(const Cli& cli, const CLI::App& command, const FixOptions& options) {
   // In the order of the help.
-  for (const char* option : {"--touches", "--drop-duplicates", "--swap-fingers", "--finger-order",
+  for (const char* option : {"--touches", "--drop-duplicates", "--drop-stale", "--swap-fingers", "--finger-order",
                              "--scale-times", "--scale-targets", "--scale-standoff", "--scale-speed",
                              "--reverse-approach", "--reverse-lateral", "--move-object"})
     if (command.count(option) > 0)
@@ -219,6 +220,8 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
       ->type_name("A-B,...");
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
+  command->add_flag("--drop-stale", options->drop_stale,
+                    "Drop rows whose times repeat those of the row before to the last digit");
   command
       ->add_option("--shift-rows", options->shift_rows,
                    "The times (the picture) of each row belong so many rows further down (up: below 0); rows "

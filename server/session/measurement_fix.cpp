@@ -74,6 +74,13 @@ std::vector<int> RowsWithoutDuplicates(const MeasurementSet& set) {
   return kept;
 }
 
+std::vector<int> RowsThatAreNotStale(const MeasurementSet& set) {
+  std::vector<int> kept;
+  for (int row = 0; row < set.size(); ++row)
+    if (!RepeatsRow(set, row, 1)) kept.push_back(row);
+  return kept;
+}
+
 template <typename T>
 void Keep(const std::vector<int>& rows, int width, std::vector<T>* column) {
   if (column->empty()) return;
@@ -212,9 +219,24 @@ absl::StatusOr<std::vector<int>> ApplyToTouches(const MeasurementFix& fix, Measu
 }  // namespace
 
 bool MeasurementFix::empty() const {
-  return !drop_duplicates && shift_rows == 0 && finger_order.empty() && rename_objects.empty() &&
-         scale_times == 1 && scale_targets == 1 && scale_standoff == 1 && scale_speed == 1 && !axes &&
-         !reverse_approach && !reverse_lateral && move_objects_m.empty();
+  return !drop_duplicates && !drop_stale && shift_rows == 0 && finger_order.empty() &&
+         rename_objects.empty() && scale_times == 1 && scale_targets == 1 && scale_standoff == 1 &&
+         scale_speed == 1 && !axes && !reverse_approach && !reverse_lateral && move_objects_m.empty();
+}
+
+bool RepeatsRow(const MeasurementSet& set, int row, int lag) {
+  if (row < lag) return false;
+  int reported = 0;
+  bool differ = false;
+  double first_s = NAN;
+  for (int i = 0; i < set.fingers; ++i) {
+    const double time_s = set.TimeS(row, i), before_s = set.TimeS(row - lag, i);
+    if (time_s != before_s && !(std::isnan(time_s) && std::isnan(before_s))) return false;
+    if (std::isnan(time_s)) continue;
+    if (reported++ == 0) first_s = time_s;
+    differ |= time_s != first_s;
+  }
+  return reported >= 2 && differ;
 }
 
 absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, MeasurementSet* set) {
@@ -228,6 +250,7 @@ absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, Measurement
     Keep(rows, 1, &left);
   };
   if (fix.drop_duplicates) keep(RowsWithoutDuplicates(*set));
+  if (fix.drop_stale) keep(RowsThatAreNotStale(*set));
   if (fix.shift_rows != 0) keep(ShiftTimes(fix.shift_rows, set));
   if (!fix.finger_order.empty()) OrderFingers(fix.finger_order, set);
   if (!fix.rename_objects.empty()) RenameObjects(fix.rename_objects, set);
@@ -247,6 +270,7 @@ std::string FixOptions(const MeasurementFix& fix, int fingers) {
     options.push_back("--touches " + absl::StrJoin(ranges, ","));
   }
   if (fix.drop_duplicates) options.push_back("--drop-duplicates");
+  if (fix.drop_stale) options.push_back("--drop-stale");
   if (fix.shift_rows != 0) options.push_back(absl::StrCat("--shift-rows=", fix.shift_rows));
   if (!fix.finger_order.empty()) {
     std::vector<std::string> moved, all;

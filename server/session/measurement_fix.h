@@ -22,6 +22,7 @@ struct MeasurementFix {
   // they are, and no time moves between them and these.
   std::vector<std::pair<uint64_t, uint64_t>> touches;
   bool drop_duplicates = false;  // rows whose touch and times all repeat an earlier row's, digit for digit
+  bool drop_stale = false;       // rows that RepeatsRow says to repeat the row before
   int shift_rows = 0;  // the times of row k belong to row k + shift_rows; rows that get none are dropped
   std::vector<int>
       finger_order;  // the file's i-th time column holds finger finger_order[i]; empty: as they are
@@ -40,6 +41,10 @@ struct MeasurementFix {
 
   bool empty() const;
 };
+
+// Whether a row holds the times of the one `lag` rows before, digit for digit: a reading that was not renewed. Rows of
+// fewer than two times, or of equal ones, say nothing.
+bool RepeatsRow(const MeasurementSet& set, int row, int lag);
 
 // Fixes the set. Returns the rows of the old set that are left, in their order. Errors: an object or a finger that the
 // set does not have, a factor that is not above 0, poses that the set does not have.

@@ -136,6 +136,12 @@ TEST(MeasurementFix, ScalesMovesShiftsAndDrops) {
             "0,cup,20,60,1,2,3,0,0,-1,1,0,0,6,0,8,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,5,0,7,\n");
   EXPECT_EQ(FixedText(rows, [](auto* f) { f->drop_duplicates = true; }),
             "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,6,0,8,\n");
+  const std::string stale =
+      "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n1,cup,20,60,4,2,3,0,0,-1,1,0,0,5,0,7,\n"
+      "2,cup,20,60,1,2,3,0,0,-1,1,0,0,0,0,0,\n3,cup,20,60,1,2,4,0,0,-1,1,0,0,0,0,0,\n";
+  EXPECT_EQ(FixedText(stale, [](auto* f) { f->drop_stale = true; }),
+            "0,cup,20,60,1,2,3,0,0,-1,1,0,0,5,0,7,\n2,cup,20,60,1,2,3,0,0,-1,1,0,0,0,0,0,\n"
+            "3,cup,20,60,1,2,4,0,0,-1,1,0,0,0,0,0,\n");
 }
 
 TEST(MeasurementFix, RefusesWhatTheSetDoesNotHave) {

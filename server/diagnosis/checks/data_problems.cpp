@@ -17,8 +17,10 @@
 #include "server/diagnosis/checks/mesh_units.h"
 #include "server/diagnosis/checks/object_mistakes.h"
 #include "server/diagnosis/checks/part_mistakes.h"
+#include "server/diagnosis/checks/round_speed.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/sorted_column.h"
+#include "server/diagnosis/checks/stale_rows.h"
 #include "server/diagnosis/checks/tried.h"
 #include "server/diagnosis/checks/two_mistakes.h"
 #include "server/diagnosis/selection/workspace.h"
@@ -93,8 +95,11 @@ class ProblemList {
   }
   void AddMeshUnit(const MeshUnit& wrong);
   void AddDuplicates(const touches::Observations& o);
+  void AddStaleRows();
+  void AddRoundSpeed(const touches::Observations& o);
   void AddSortedColumn(const TrialResult& before);
 
+  bool empty() const { return problems_.empty(); }
   std::vector<engine::DataProblem> Take() { return std::move(problems_); }
 
  private:
@@ -169,6 +174,41 @@ void ProblemList::AddDuplicates(const touches::Observations& o) {
            "everything else too certain.",
            duplicates.rows, set.size(), set.touch[duplicates.example]),
        TouchFixCommand(fix, set), BeforeS(), RmseAfter(input_, fix, pool_)});
+}
+
+void ProblemList::AddStaleRows() {
+  const session::MeasurementSet& set = *input_.set;
+  const StaleRows stale = FindStaleRows(set);
+  if (stale.rows == 0) return;
+  session::MeasurementFix fix;
+  fix.drop_stale = true;
+  const double after_s = RmseAfter(input_, fix, pool_);
+  problems_.push_back(
+      {ProblemKind::kStaleRows, absl::StrCat(stale.rows, " of ", set.size(), " rows"),
+       absl::StrFormat(
+           "%d of %d rows hold the times of the row before to the last digit, though they are "
+           "touches of another pose (the first is touch %d): the reading was not renewed. Without "
+           "them the model as it is would be off by %s instead of %s.",
+           stale.rows, set.size(), set.touch[stale.example], TimeInWords(after_s), TimeInWords(BeforeS())),
+       TouchFixCommand(fix, set), BeforeS(), after_s});
+}
+
+void ProblemList::AddRoundSpeed(const touches::Observations& o) {
+  const RoundSpeed found = FindRoundSpeed(o);
+  if (found.round < 0) return;
+  const std::string factor = absl::StrFormat("%.4g", found.factor);
+  Mistake mistake{
+      ProblemKind::kSpeedFactor,
+      absl::StrCat("round ", found.round, " x ", factor),
+      absl::StrFormat(
+          "round %d was made at %s +- %.1g times the speed that the file says, or its clock ran so "
+          "much slower,",
+          found.round, factor, found.std_error),
+      {},
+      {}};
+  mistake.fix.scale_speed = found.factor;
+  ConfineTo(*input_.set, found.rows, &mistake);
+  AddAlternatives({mistake});
 }
 
 void ProblemList::AddSortedColumn(const TrialResult& before) {
@@ -273,11 +313,22 @@ absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const Diagnosi
   if (!before.ok() || before->objects.empty()) return none;
 
   ProblemList problems(input, context.pool);
+  // Whatever else the file seems to have may be these rows.
+  problems.AddStaleRows();
+  if (!problems.empty()) return problems.Take();
   if (!NothingToExplain(*before)) {
     const absl::Status looked = LookForMistakes(input, context, trial, *before, &problems);
     if (!looked.ok()) return looked;
   }
+  if (problems.empty()) problems.AddRoundSpeed(*o);
   problems.AddDuplicates(*o);
+  return problems.Take();
+}
+
+std::vector<engine::DataProblem> FindProblemsOfRows(const DiagnosisInput& input, const std::vector<int>& rows,
+                                                    ThreadPool* pool) {
+  ProblemList problems(input, pool);
+  problems.AddAlternatives(MistakesOfRows(Trial(input, rows), pool));
   return problems.Take();
 }
 

@@ -30,4 +30,8 @@ namespace touchstone::diagnosis::checks {
 absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const DiagnosisInput& input,
                                                                   const DiagnosisContext& context);
 
+// The same for rows that a fit has set aside: the mistakes that explain these rows alone, the others being right.
+std::vector<engine::DataProblem> FindProblemsOfRows(const DiagnosisInput& input, const std::vector<int>& rows,
+                                                    ThreadPool* pool);
+
 }  // namespace touchstone::diagnosis::checks

@@ -1,6 +1,7 @@
 #include "server/diagnosis/checks/data_problems.h"
 
 #include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <functional>
 
+#include "server/base/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/spoilt_test_file.h"
@@ -169,6 +171,81 @@ TEST(DataProblems, EqualRepeatsOfAModelWithoutNoiseOrOfCoarseTicksAreNoCopies) {
   ticks.known.clear();
   ticks.hidden = {{"poll_interval", {"interval_us=20000"}}};
   EXPECT_TRUE(ProblemsOf(MakeFile(ticks)).empty());
+}
+
+// The times of a share of the rows, or of all, on ticks; the others to a microsecond.
+DiagnosisInput WithTicks(double tick_s, double share) {
+  touches::HiddenRig rig = Rig();
+  rig.rounds = 4;
+  return Spoilt(MakeFile(rig), [&](MeasurementSet* set) {
+    RandomStream random(3, RandomDomain::kDiagnosis, 1);
+    for (int row = 0; row < set->size(); ++row) {
+      const double step_s = random.Uniform() < share ? tick_s : 1e-6;
+      for (int i = 0; i < 3; ++i)
+        set->time_s[row * 3 + i] =
+            std::round(std::round(set->time_s[row * 3 + i] / step_s) * step_s * 1e6) * 1e-6;
+    }
+  });
+}
+
+TEST(DataProblems, EqualRowsOnATickThatAShareOfTheTouchesHasAreNoCopies) {
+  for (const double tick_s : {0.008, 0.01, 0.016, 0.02})
+    for (const double share : {0.5, 0.9, 1.0})
+      EXPECT_TRUE(ProblemsOf(WithTicks(tick_s, share)).empty()) << tick_s << " s in a share of " << share;
+}
+
+TEST(DataProblems, CopiesOfUntidyTimesAreTakenForCopiesBesideTicks) {
+  const auto problems = ProblemsOf(Spoilt(WithTicks(0.02, 0.5), [](MeasurementSet* set) {
+    for (int row = 0; row < 18; ++row)
+      for (int i = 0; i < 3; ++i) {
+        set->time_s[row * 3 + i] = std::round(set->time_s[row * 3 + i] * 1e6 + 137 * i * (row + 3)) * 1e-6;
+        set->time_s[(row + 24) * 3 + i] = set->time_s[row * 3 + i];
+      }
+  }));
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].kind, ProblemKind::kDuplicates);
+}
+
+TEST(DataProblems, RowsThatHoldTheTimesOfTheRowBeforeAreTold) {
+  for (const double share : {0.03, 0.1, 0.25}) {
+    int stale = 0;
+    const auto problems = ProblemsOf(Spoilt(MakeFile(Rig()), [&](MeasurementSet* set) {
+      RandomStream random(5, RandomDomain::kDiagnosis, 1);
+      for (int row = 1; row < set->size(); ++row) {
+        if (random.Uniform() >= share) continue;
+        ++stale;
+        for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = set->time_s[(row - 1) * 3 + i];
+      }
+    }));
+    ASSERT_EQ(problems.size(), 1u) << share;
+    EXPECT_EQ(problems[0].kind, ProblemKind::kStaleRows);
+    EXPECT_EQ(problems[0].detail, absl::StrCat(stale, " of 144 rows"));
+    EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--drop-stale"));
+    EXPECT_LT(problems[0].error_after, 0.6 * problems[0].error_before);
+  }
+}
+
+TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
+  touches::HiddenRig rig = Rig();
+  rig.rounds = 4;
+  rig.sigma_us = 2000;
+  const DiagnosisInput right = MakeFile(rig);
+  EXPECT_TRUE(ProblemsOf(right).empty());
+  const auto at_factor = [&](double factor, int round) {
+    return ProblemsOf(Spoilt(right, [&](MeasurementSet* set) {
+      for (int row = 0; row < set->size(); ++row)
+        if (row / 24 % 4 == round)
+          for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] /= factor;
+    }));
+  };
+  for (const double factor : {0.97, 1.03, 1.2}) {
+    const auto problems = at_factor(factor, 2);
+    ASSERT_EQ(problems.size(), 1u) << factor;
+    EXPECT_EQ(problems[0].kind, ProblemKind::kSpeedFactor);
+    EXPECT_THAT(problems[0].detail, ::testing::HasSubstr("round 2 x "));
+    EXPECT_THAT(problems[0].fix, ::testing::HasSubstr("--scale-speed"));
+    EXPECT_LT(problems[0].error_after, problems[0].error_before) << factor;
+  }
 }
 
 TEST(DataProblems, AColumnThatWasSortedAloneIsTold) {

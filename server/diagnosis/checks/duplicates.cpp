@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "server/diagnosis/touches/ticks.h"
+
 namespace touchstone::diagnosis::checks {
 namespace {
 
@@ -43,7 +45,7 @@ struct Pose {
 
 Duplicates FindDuplicates(const touches::Observations& o, const model::Model& model) {
   const session::MeasurementSet& set = *o.set;
-  Duplicates found;
+  std::vector<int> copies;  // rows
   std::vector<Pose> poses(o.poses);
   std::vector<int> pose_of_row(set.size(), -1);
   for (int k = 0; k < o.size() && set.has_poses; ++k) pose_of_row[o.row[k]] = o.pose[k];
@@ -66,11 +68,10 @@ Duplicates FindDuplicates(const touches::Observations& o, const model::Model& mo
       pose.first.push_back(row);
       continue;
     }
-    ++found.rows;
-    if (found.example < 0) found.example = row;
+    copies.push_back(row);
     equal_session_times &= set.session_time_s[row] == set.session_time_s[*same];
   }
-  if (found.rows < std::max<double>(kMinCopies, kMinShare * set.size())) return {};
+  if (static_cast<double>(copies.size()) < std::max<double>(kMinCopies, kMinShare * set.size())) return {};
 
   double squares = 0, freedom = 0, pairs = 0;
   for (const Pose& pose : poses) {
@@ -90,11 +91,27 @@ Duplicates FindDuplicates(const touches::Observations& o, const model::Model& mo
   }
   const double sigma_s =
       freedom >= kMinFreedom ? std::sqrt(std::max(squares, 0.0) / freedom) : ModelNoiseS(model);
-  if (!(sigma_s > 0)) return equal_session_times ? found : Duplicates{};
-  // Two normal numbers of a common mean fall on one tick with tick / (2 sqrt(pi) sigma).
-  const double match = std::min(1.0, ResolutionS(set) / (2 * std::sqrt(M_PI) * sigma_s));
-  found.expected = pairs * std::pow(match, set.fingers - 1);
-  return found.rows > kMinCopies + kOverChance * found.expected ? found : Duplicates{};
+  if (!(sigma_s > 0))
+    return equal_session_times ? Duplicates{static_cast<int>(copies.size()), 0, copies[0]} : Duplicates{};
+  // Copies on a tick of the sensor are expected with the tick, all others with the resolution of the file.
+  const double tick_s = touches::FindTouchTicks(o).interval_s;
+  const auto first_untidy = std::stable_partition(copies.begin(), copies.end(), [&](int row) {
+    return tick_s > 0 && touches::LiesOnTick(set, row, tick_s);
+  });
+  Duplicates found;
+  const auto judge = [&](auto begin, auto end, double step_s) {
+    // Two normal numbers of a common mean fall on one tick with tick / (2 sqrt(pi) sigma).
+    const double match = std::min(1.0, step_s / (2 * std::sqrt(M_PI) * sigma_s));
+    const double expected = pairs * std::pow(match, set.fingers - 1);
+    if (static_cast<double>(end - begin) <= kMinCopies + kOverChance * expected) return;
+    found.rows += static_cast<int>(end - begin);
+    found.expected += expected;
+    for (auto copy = begin; copy != end; ++copy)
+      if (found.example < 0 || *copy < found.example) found.example = *copy;
+  };
+  judge(copies.begin(), first_untidy, tick_s);
+  judge(first_untidy, copies.end(), ResolutionS(set));
+  return found;
 }
 
 }  // namespace touchstone::diagnosis::checks

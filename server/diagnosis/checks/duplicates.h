@@ -15,7 +15,8 @@ struct Duplicates {
 
 // No rig repeats a touch to the last digit; a clock of coarse ticks does. Zero rows unless there are far more copies
 // than chance gives, and enough to matter: copies taken for repeats make the noise floor too low and every misfit
-// that repeats too certain. A model without noise expects equal repeats, and then only equal session times count.
+// that repeats too certain. Copies that lie on a tick of the sensor,
+// which may hold for a part of the touches, are expected with it. A model without noise expects equal repeats, and then only equal session times count.
 Duplicates FindDuplicates(const touches::Observations& observations, const model::Model& model);
 
 }  // namespace touchstone::diagnosis::checks

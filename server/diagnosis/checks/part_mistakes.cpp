@@ -241,6 +241,28 @@ bool Complete(const Trial& trial, Candidate candidate, Mistake* mistake) {
 
 }  // namespace
 
+void ConfineTo(const session::MeasurementSet& set, const std::vector<int>& rows, Mistake* mistake) {
+  std::vector<char> wrong(set.size(), 0);
+  for (const int row : rows) wrong[row] = 1;
+  mistake->part = true;
+  const Ranges ranges = RangesOf(set, wrong);
+  if (ranges.size() <= kMaxRanges) mistake->fix.touches = ranges;
+  absl::StrAppend(&mistake->detail, ", ", InWords(ranges));
+  absl::StrAppend(&mistake->words, " in ", rows.size(), " of the ", set.size(), " touches alone (",
+                  InWords(ranges), ")");
+}
+
+std::vector<Mistake> MistakesOfRows(const Trial& trial, ThreadPool* pool) {
+  const absl::StatusOr<TrialResult> before = trial.Run({});
+  if (!before.ok() || static_cast<int>(trial.rows().size()) < kMinPart) return {};
+  std::vector<Mistake> found;
+  for (Tried& one : Convincing(TryAll(trial, AllMistakes(trial, *before), pool), *before)) {
+    ConfineTo(*trial.input().set, trial.rows(), &one.mistake);
+    found.push_back(std::move(one.mistake));
+  }
+  return found;
+}
+
 std::vector<Mistake> PartMistakes(const Trial& trial, const TrialResult& before,
                                   const std::vector<Tried>& tried) {
   const double coarse_s = kMinMisfitM / std::max(before.speed_m_s, 1e-6);

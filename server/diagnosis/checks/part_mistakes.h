@@ -17,4 +17,10 @@ namespace touchstone::diagnosis::checks {
 std::vector<Mistake> PartMistakes(const Trial& trial, const TrialResult& before,
                                   const std::vector<Tried>& tried);
 
+// Says of which rows the mistake is, in its words, its detail and its fix.
+void ConfineTo(const session::MeasurementSet& set, const std::vector<int>& rows, Mistake* mistake);
+
+// Those that explain the trial's rows by themselves, which are a part of the file that the rest disagrees with.
+std::vector<Mistake> MistakesOfRows(const Trial& trial, ThreadPool* pool);
+
 }  // namespace touchstone::diagnosis::checks

@@ -5,51 +5,21 @@
 #include <map>
 
 #include "server/diagnosis/touches/noise_search.h"
+#include "server/diagnosis/touches/ticks.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
 
-constexpr double kExcludedNats = 5;         // loss that rules a declared value out
-constexpr double kTickTolerance = 1.01e-6;  // s: files keep whole microseconds
-constexpr double kMinTick = 20e-6;          // s
+constexpr double kExcludedNats = 5;  // loss that rules a declared value out
 constexpr size_t kMinDelays = 20;
 constexpr double kMinMissed = 0.002;  // share of the readings: less is no property of the rig
-
-// Times of a polling loop differ by whole multiples of its interval: the interval that `differences` (sorted) fit,
-// near `interval`; 0 if they do not.
-double RefinedTick(const std::vector<double>& differences, double interval) {
-  // Refined over ever larger differences, so that the count of ticks stays certain.
-  for (size_t known = 1; known < differences.size(); known *= 2) {
-    double sum_nd = 0, sum_nn = 0;
-    for (size_t j = 0; j < std::min(2 * known, differences.size()); ++j) {
-      const double ticks = std::round(differences[j] / interval);
-      sum_nd += ticks * differences[j], sum_nn += ticks * ticks;
-    }
-    if (!(sum_nn > 0)) return 0;
-    interval = sum_nd / sum_nn;
-  }
-  size_t on_tick = 0;
-  for (const double difference : differences)
-    on_tick += std::abs(difference - std::round(difference / interval) * interval) <= kTickTolerance;
-  return on_tick < 0.99 * differences.size() ? 0 : interval;
-}
 
 NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<double>& declared_s) {
   NoiseEstimate found;
   if (differences.size() < kMinDelays) return found;
   std::sort(differences.begin(), differences.end());
-  // The smallest step between different values is the interval, or a small multiple of it.
-  double min_gap = differences[0];
-  for (size_t j = 1; j < differences.size(); ++j) {
-    const double gap = differences[j] - differences[j - 1];
-    if (gap > 2 * kTickTolerance) min_gap = std::min(min_gap, gap);
-  }
-  double interval = 0;
-  for (int divisor = 1; divisor <= 3 && interval == 0; ++divisor) {
-    if (min_gap / divisor < kMinTick) break;
-    interval = RefinedTick(differences, min_gap / divisor);
-  }
-  if (interval == 0 && declared_s && *declared_s >= kMinTick) {
+  double interval = FindTick(differences);
+  if (interval == 0 && declared_s && *declared_s >= kMinTickS) {
     interval = RefinedTick(differences, *declared_s);
     found.absent = interval == 0;
   }
@@ -59,7 +29,7 @@ NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<d
       0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
   found.std_error = std::max(found.std_error, 1e-9);
   // Each difference would fall on a tick by chance with this probability.
-  found.gain_nats = differences.size() * std::log(interval / (2 * kTickTolerance));
+  found.gain_nats = differences.size() * std::log(interval / (2 * kTickToleranceS));
   return found;
 }
 
