@@ -4,9 +4,7 @@
 #include "client/cli/board.h"
 #include "client/cli/comparison.h"
 #include "client/cli/model_output.h"
-#include "client/source/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -21,23 +19,12 @@ struct DiagnoseOptions : ComparisonOptions {
   BoardOptions board;
 };
 
-// The formula of what no built-in effect explains, or the curve, as effects of this model; of several kinds of
+// The improved model with the formula of what no built-in effect explains, or the curve, in its place; of several kinds of
 // measurement the first's. Empty: there is none.
-absl::StatusOr<std::vector<model::EffectInstance>> SuggestedEffects(const model::Model& model,
-                                                                    const v1::Report& report) {
-  std::string yaml;
-  for (const v1::DataReport& data : report.data()) {
-    const v1::Unexplained& rest = data.unexplained();
-    if (yaml.empty()) yaml = rest.formula_yaml().empty() ? rest.lookup_yaml() : rest.formula_yaml();
-  }
-  if (yaml.empty()) return std::vector<model::EffectInstance>();
-  const std::string file =
-      absl::StrCat("touchstone: model/1\nname: suggested\nend_effector: {fingers: ", model.fingers,
-                   ", spacing_mm: ", ShortestNumber(client::LabNumber(Unit::kMillimetre, model.spacing_m)),
-                   "}\neffects:\n", yaml);
-  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model suggested,
-                              model::ParseModel(file, "the suggested effect", effects::Catalogue()));
-  return std::move(suggested.effects);
+std::string SuggestedModel(const v1::Report& report) {
+  for (const v1::DataReport& data : report.data())
+    if (!data.unexplained().model_yaml().empty()) return data.unexplained().model_yaml();
+  return "";
 }
 
 // The improved model under the file's name, or the model itself where nothing had to change.
@@ -52,15 +39,13 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
                                 comparison->connection().Call(&v1::Models::Stub::GetModel, request));
     yaml = same.yaml();
   }
+  const std::string with = options.with_formula ? SuggestedModel(report) : "";
+  if (options.with_formula && with.empty())
+    cli.Log("--with-formula: this report suggests no formula and no curve");
+  const bool suggested = !with.empty();
+  if (suggested) yaml = with;
   TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
                               model::ParseModel(yaml, "the improved model", effects::Catalogue()));
-  bool suggested = false;
-  if (options.with_formula) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const auto effects, SuggestedEffects(model, report));
-    suggested = !effects.empty();
-    model.effects.insert(model.effects.end(), effects.begin(), effects.end());
-    if (!suggested) cli.Log("--with-formula: this report suggests no formula and no curve");
-  }
   // A new model under the old one's name would be refused by a server that knows the old one.
   const model::Model as_it_was = model;
   model.name = std::filesystem::path(options.save_model).stem().string();

@@ -61,6 +61,7 @@ std::string Compared(const v1::Report& report) {
   }
   const ErrorScale scale(data);
   const double rmse = data.initial().rmse();
+  if (AgreesToRounding(data)) return "The model agrees with the data to the rounding of files and meshes.";
   if (!(rmse > 0)) return "Nothing could be compared.";
   const Floor floor = NoiseFloorOf(data);
   if (!(floor.sigma > 0)) return absl::StrCat("The model is off by ", scale.Text(rmse), ".");
@@ -154,8 +155,25 @@ std::string MissingEffects(const v1::Report& report) {
 
 }  // namespace
 
+bool AgreesToRounding(const v1::DataReport& data) {
+  return data.noise().is_rounding() && data.initial().rmse() <= data.noise_floor();
+}
+
+std::string VerdictWord(const v1::Report& report) {
+  return report.verdict() == v1::Report::VERDICT_UNSPECIFIED ? ""
+                                                             : v1::Report::Verdict_Name(report.verdict());
+}
+
+std::string NothingMissingWords(const v1::Report& report) {
+  if (!report.has_p_nothing_missing()) return "";
+  const double p = report.p_nothing_missing();
+  return absl::StrCat("P(nothing is missing) ", p < 1e-15 ? "" : "= ", Probability(p), " over ",
+                      Count(report.hypotheses_tried()), " hypotheses.");
+}
+
 std::string Headline(const v1::Report& report) {
-  const std::string model = report.model_name().empty() ? "the model" : report.model_name();
+  const std::string model =
+      report.model_name().empty() ? "the model" : absl::StrCat("'", report.model_name(), "'");
   if (MainData(report).has_distributions()) return Compared(report);
   switch (report.verdict()) {
     case v1::Report::ADEQUATE:

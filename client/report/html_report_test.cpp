@@ -88,7 +88,7 @@ TEST(HtmlReport, HasEverySectionWhoseDataAreThere) {
 TEST(HtmlReport, ShowsMistakesOfTheFileWithTheirEvidenceAndTheCommand) {
   const std::string page = HtmlReport(CheckDataReport());
   EXPECT_EQ(Occurrences(page, "<section id=\"check\""), 1);
-  EXPECT_EQ(Occurrences(page, "Check the data</span>"), 1);
+  EXPECT_EQ(Occurrences(page, "CHECK_DATA</span>"), 1);
   EXPECT_EQ(Occurrences(page, "--reverse-lateral -o fixed.csv</pre>"), 1);
   EXPECT_EQ(Occurrences(HtmlReport(AdequateReport()), "<section id=\"check\""), 0);
 }

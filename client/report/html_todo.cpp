@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/report/html_page.h"
+#include "client/report/next_commands.h"
 #include "client/report/svg_chart.h"
 #include "client/report/words.h"
 
@@ -94,6 +95,13 @@ std::string HtmlWhatToDo(const v1::Report& report) {
             : absl::StrCat("<span>hash <code title=\"", Escape(report.improved_model_hash()), "\">",
                            Escape(report.improved_model_hash().substr(0, 12)), "</code></span>"),
         "</div>\n<pre id=\"model\">", Escape(report.improved_model_yaml()), "</pre>\n");
+  }
+  int command = 0;
+  for (const NextCommand& next : NextCommands(report)) {
+    const std::string id = absl::StrCat("next", ++command);
+    absl::StrAppend(
+        &body, "<h3>", Escape(next.purpose), "</h3>\n<div class=\"row\"><button type=\"button\" data-copy=\"",
+        id, "\">Copy</button></div>\n<pre class=\"wrap\" id=\"", id, "\">", Escape(next.command), "</pre>\n");
   }
   return Section("todo", "What to do", "", body);
 }

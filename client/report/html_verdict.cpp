@@ -12,23 +12,11 @@ namespace touchstone::client {
 namespace {
 
 std::string Pill(const v1::Report& report) {
-  switch (report.verdict()) {
-    case v1::Report::ADEQUATE:
-      return "<span class=\"pill good\">Adequate</span>";
-    case v1::Report::WRONG_VALUES:
-      return "<span class=\"pill\">Wrong values</span>";
-    case v1::Report::MISSING_EFFECTS:
-      return absl::StrCat("<span class=\"pill\">Missing effect", report.steps_size() > 1 ? "s" : "",
-                          "</span>");
-    case v1::Report::UNEXPLAINED:
-      return "<span class=\"pill\">Unexplained</span>";
-    case v1::Report::CHECK_DATA:
-      return "<span class=\"pill\">Check the data</span>";
-    case v1::Report::TOO_LITTLE_DATA:
-      return "<span class=\"pill plain\">Too little data</span>";
-    default:
-      return "<span class=\"pill plain\">Comparison</span>";
-  }
+  const std::string word = VerdictWord(report);
+  const char* kind = report.verdict() == v1::Report::ADEQUATE                          ? "pill good"
+                     : word.empty() || report.verdict() == v1::Report::TOO_LITTLE_DATA ? "pill plain"
+                                                                                       : "pill";
+  return absl::StrCat("<span class=\"", kind, "\">", word.empty() ? "Comparison" : word, "</span>");
 }
 
 std::string Facts(const v1::Report& report) {
@@ -37,6 +25,8 @@ std::string Facts(const v1::Report& report) {
   text += NoiseFloorSentence(MainData(report));
   const std::string times = TimesTheFloor(report);
   if (!times.empty()) absl::StrAppend(&text, " The given model's error is ", times, ".");
+  if (const std::string nothing = NothingMissingWords(report); !nothing.empty())
+    absl::StrAppend(&text, " ", nothing);
   if (!FingerScatterWords(report).empty() && report.verdict() != v1::Report::ADEQUATE)
     absl::StrAppend(&text, " Of the fingers, ", FingerScatterWords(report), ".");
   return Typeset(text);

@@ -11,6 +11,7 @@
 #include <absl/strings/str_split.h>
 
 #include "client/report/error_scale.h"
+#include "client/report/next_commands.h"
 
 namespace touchstone::client {
 namespace {
@@ -257,6 +258,10 @@ void AddWhatToDo(const v1::Report& report, TextLayout* out) {
   if (!report.improved_model_hash().empty()) {
     out->Paragraph(absl::StrCat("The improved model has the hash ",
                                 report.improved_model_hash().substr(0, 12), "... (--save-model writes it)."));
+  }
+  for (const NextCommand& next : NextCommands(report)) {
+    out->Paragraph(absl::StrCat(next.purpose, ":"));
+    out->Verbatim(next.command);
   }
   out->Label("");
 }

@@ -27,7 +27,10 @@ void AddOpening(const v1::Report& report, TextLayout* out) {
     out->Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
   out->Blank();
   const bool good = report.verdict() == v1::Report::ADEQUATE;
-  out->Lead(Headline(report), good ? TextLayout::kGood : TextLayout::kBold);
+  const std::string verdict = VerdictWord(report);
+  out->Lead(absl::StrCat(verdict, verdict.empty() ? "" : ": ", Headline(report)),
+            good ? TextLayout::kGood : TextLayout::kBold);
+  if (const std::string nothing = NothingMissingWords(report); !nothing.empty()) out->Lead(nothing);
   out->Blank();
 }
 

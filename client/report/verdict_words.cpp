@@ -30,6 +30,7 @@ std::string TimesTheFloor(const v1::Report& report) {
   const ErrorScale scale(data);
   const double ratio = floor.sigma > 0 ? data.initial().rmse() / floor.sigma : 0;
   if (!(ratio > 0)) return "";
+  if (AgreesToRounding(data)) return "which is the rounding of files and meshes";
   if (ratio <= 1.02) return "no more than the floor";
   const std::string times = absl::StrCat(Number(ratio, 2), " times the floor");
   const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(data.reducible_share()));
@@ -60,6 +61,7 @@ std::string FingerScatterWords(const v1::Report& report) {
 }
 
 std::string FingerBiasWords(const v1::DataReport& data) {
+  if (AgreesToRounding(data)) return "";
   std::vector<std::string> fingers;
   for (int i = 0; i < data.finger_bias_size(); ++i)
     fingers.push_back(absl::StrCat(i < data.fingers_size() ? data.fingers(i) : absl::StrCat(i), " ",

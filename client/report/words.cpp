@@ -248,7 +248,9 @@ std::string NoiseFloorSentence(const v1::DataReport& data) {
   if (!(floor.sigma > 0)) return "";
   const uint32_t repeats = data.set().repeats();
   return absl::StrCat(" Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data),
-                      floor.bound   ? ", an upper bound without repeats."
+                      data.noise().is_rounding()
+                          ? ", what files and meshes are rounded to: the data scatter by less."
+                      : floor.bound ? ", an upper bound without repeats."
                       : repeats > 0 ? absl::StrCat(", from ", Count(repeats), " repeats.")
                                     : ".");
 }

@@ -104,6 +104,15 @@ std::string CountToVerdict(const v1::NextMeasurement& next);
 // A command over as many lines as it needs, so that a shell takes them as one.
 std::string ShellLines(const std::string& command, int columns);
 
+// Whether the given model agrees with the data to what their numbers are rounded to.
+bool AgreesToRounding(const v1::DataReport& data);
+
+// "ADEQUATE", as JSON has it; empty for a comparison.
+std::string VerdictWord(const v1::Report& report);
+
+// "P(nothing is missing) = 0.31 over 214 hypotheses."; empty where that was not assessed.
+std::string NothingMissingWords(const v1::Report& report);
+
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 

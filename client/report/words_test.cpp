@@ -81,7 +81,7 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
   EXPECT_EQ(Headline(WrongValuesReport()),
             "No effect is missing, but the values of contact_slowdown are off: put right, the error falls "
             "from 9.10 ms to 815 us.");
-  EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: nominal is as good as 960 touches can tell.");
+  EXPECT_EQ(Headline(AdequateReport()), "Nothing is missing: 'nominal' is as good as 960 touches can tell.");
   EXPECT_EQ(Headline(CheckDataReport()),
             "Check the data before the model: lateral vectors reversed (lateral -> -lateral); fixed, the "
             "error falls "

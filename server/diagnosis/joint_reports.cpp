@@ -82,6 +82,7 @@ class JointDiagnoser {
       TOUCHSTONE_RETURN_IF_ERROR(Measure(step.model, &parts_.shared_quality.emplace_back()));
     TOUCHSTONE_RETURN_IF_ERROR(DiagnoseEach());
     std::optional<model::Model> improved = Improved();
+    CompleteSuggestions();
     report::Diagnosis diagnosis = report::Join(std::move(parts_));
     diagnosis.improved_model = std::move(improved);
     return diagnosis;
@@ -162,11 +163,30 @@ class JointDiagnoser {
     const std::optional<model::Model>&touches = parts_.touches.improved_model,
           &pictures = parts_.photographs.improved_model;
     if (parts_.shared.steps.empty() && !touches && !pictures) return std::nullopt;
-    model::Model both = selection::TouchPartOf(touches ? *touches : parts_.shared.in_place);
-    const model::Model of_pictures = PhotographPartOf(pictures ? *pictures : parts_.shared.in_place);
+    return Both(touches ? *touches : parts_.shared.in_place, pictures ? *pictures : parts_.shared.in_place);
+  }
+
+  // The effects of touches of the one model, those of photographs of the other.
+  model::Model Both(const model::Model& touches, const model::Model& photographs) const {
+    model::Model both = selection::TouchPartOf(touches);
+    const model::Model of_pictures = PhotographPartOf(photographs);
     both.effects.insert(both.effects.end(), of_pictures.effects.begin(), of_pictures.effects.end());
     both.name = input_.model->name.empty() ? "" : input_.model->name + "_better";
     return both;
+  }
+
+  // A suggestion for the rest of one kind stands in the model beside what the other kind has found.
+  void CompleteSuggestions() {
+    const auto complete = [this](report::Diagnosis* own, const report::Diagnosis& other, bool of_touches) {
+      const model::Model& beside = other.improved_model ? *other.improved_model : parts_.shared.in_place;
+      for (report::DataReport& data : own->data)
+        if (data.unexplained && data.unexplained->model_with) {
+          model::Model& with = *data.unexplained->model_with;
+          with = of_touches ? Both(with, beside) : Both(beside, with);
+        }
+    };
+    complete(&parts_.touches, parts_.photographs, true);
+    complete(&parts_.photographs, parts_.touches, false);
   }
 
   const DiagnosisInput& input_;

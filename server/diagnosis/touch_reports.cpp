@@ -79,6 +79,8 @@ struct PhotographEffects {
       model->effects.insert(model->effects.end(), effects.begin(), effects.end());
     };
     if (diagnosis->improved_model) put_back(&*diagnosis->improved_model);
+    for (report::DataReport& data : diagnosis->data)
+      if (data.unexplained && data.unexplained->model_with) put_back(&*data.unexplained->model_with);
     for (report::Step& step : diagnosis->steps)
       if (!step.model.effects.empty()) put_back(&step.model);
   }
@@ -166,7 +168,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   }
   // As a comparison finds it: the search leaves out outliers.
   const double compared_s = touches::Rmse(o, touches::Residuals(o, workspace->nominal));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::SelectionResult selection,
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection::SelectionResult selection,
                               selection::SelectExplanation(workspace.get()));
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
@@ -175,8 +177,20 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
                               selection::QualityOf(*workspace, selection.initial_model, before));
   selection::SetError(compared_s, &quality);
   diagnosis.data[0].initial = report::InMicroseconds(quality);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, selection));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, &selection));
+  if (ladder.set_aside.is_finding) {
+    std::vector<int> rows;
+    for (const int k : o.outliers) rows.push_back(o.row[k]);
+    const std::vector<engine::DataProblem> of_rows = checks::FindProblemsOfRows(input, rows, context.pool);
+    if (!of_rows.empty()) {
+      report::Diagnosis check_data = CheckDataReport(input, gated, of_rows);
+      check_data.duration_s = Now() - began;
+      return check_data;
+    }
+  }
   report::AddLadder(ladder, &diagnosis);
+  diagnosis.p_nothing_missing = selection.nothing_missing.p;
+  diagnosis.hypotheses_tried = selection.nothing_missing.hypotheses;
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   // A part of a joint diagnosis describes what the model had left before anything was put in place.
   touches::Prediction initial = workspace->nominal;

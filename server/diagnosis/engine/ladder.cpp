@@ -63,6 +63,16 @@ absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment
   return ordered;
 }
 
+int StepWithoutGain(const Quality& before, const std::vector<LadderStep>& steps) {
+  const Quality* last = &before;
+  for (size_t j = 0; j < steps.size(); ++j) {
+    if (!(steps[j].quality.rmse < last->rmse && steps[j].quality.heldout_rmse < last->heldout_rmse))
+      return static_cast<int>(j);
+    last = &steps[j].quality;
+  }
+  return -1;
+}
+
 LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from) {
   const model::EffectInstance& instance = values.model.base().effects[from.effect];
   LadderStep step;

@@ -40,6 +40,7 @@ struct NoiseFloor {
   double lower = 0, upper = 0;  // 95 % interval; 0 if unknown
   double degrees_of_freedom = 0;
   double declared = 0;        // what the model says that it is; 0: it gives no one value
+  bool is_rounding = false;   // sigma is what numbers of files are rounded to: what scatters is less
   bool from_repeats = false;  // false: an upper bound from the best model's residuals
   // The same without what changes slowly through the session, from neighbours in time (von Neumann); 0 without
   // repeats. Less than sigma where repeats share a course in time, which is not noise.
@@ -108,7 +109,7 @@ struct UnexplainedRest {
   std::string formula;                    // a suggestion; empty: none
   std::string formula_yaml;               // the whole effect for a model file
   std::vector<ParameterEstimate> parameters;
-  double rmse = 0, heldout_rmse = 0;  // with the formula
+  double rmse = 0, heldout_rmse = 0;  // with the formula: of `model_with`
   double heldout_gain = 0;            // share of the held-out excess error that it removes, 0 to 1
   std::string nearest_effect;         // of the catalogue, and the cosine between the two
   double nearest_cosine = 0;
@@ -116,6 +117,8 @@ struct UnexplainedRest {
       words;  // what is known of it beside: "repeats with the pose, but not with the place"; may be empty
   std::string lookup_yaml;  // a curve in place of a formula, as a whole effect for a model file; empty: none
   std::shared_ptr<const model::Effect> lookup;  // the same curve; null: none
+  // The improved model with the formula, or the curve, in its place among the effects, every value fitted beside it.
+  std::optional<model::Model> model_with;
   std::string nearest_formula;       // the simple term that comes nearest to the curve; empty: none
   double nearest_formula_share = 0;  // of the curve's gain, 0 to 1
 };

@@ -76,6 +76,9 @@ class StepwiseSearch {
   // first, and goes where it is not worth its values.
   absl::StatusOr<Explanation> Continue(Explanation explanation) const;
 
+  // Every way to extend `fit` that is tried: candidates, values of the initial model's effects set free. Not scored yet.
+  std::vector<Extension> ListExtensions(const Fit& fit, int initial_effects) const;
+
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts. Of effects on one
   // object that are far behind, only an estimate (candidate_scores.cpp).
   absl::StatusOr<std::vector<Extension>> Score(const Fit& fit, int initial_effects) const;
@@ -96,7 +99,6 @@ class StepwiseSearch {
   const std::vector<Candidate>& candidates() const { return candidates_; }
 
  private:
-  std::vector<Extension> ListExtensions(const Fit& fit, int initial_effects) const;
   absl::StatusOr<bool> AddStep(Explanation* explanation) const;
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;

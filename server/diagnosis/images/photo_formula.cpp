@@ -82,6 +82,7 @@ class RestSearch {
     const std::string yaml = engine::EffectYaml(only, std::move(instance));
     (effect->formula != nullptr ? tried.formula_yaml : tried.lookup_yaml) = yaml;
     if (effect->formula != nullptr) tried.formula = effect->formula->expression;
+    tried.with = std::move(with);
     return std::optional<RestSuggestion>(std::move(tried));
   }
 

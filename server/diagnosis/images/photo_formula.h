@@ -13,6 +13,7 @@ namespace touchstone::diagnosis::images {
 
 struct RestSuggestion {
   std::string formula, formula_yaml;  // empty: no formula says what the curve says
+  model::Model with;                  // the model with it
   std::string lookup_yaml;            // empty: none, or the formula stands in its place
   std::string covariate;              // that it follows
   double rmse_grey = 0;               // that a comparison with the model and the suggestion finds

@@ -178,6 +178,7 @@ class PhotoLadder {
         SuggestForRest(photographs_, *selection_.photographs, improved_,
                        {rest->rmse, rest->heldout_rmse, d_.noise_floor.sigma}, pool_));
     if (!found) return absl::OkStatus();
+    rest->model_with = found->with;
     rest->formula = found->formula;
     rest->formula_yaml = found->formula_yaml;
     rest->lookup_yaml = found->lookup_yaml;

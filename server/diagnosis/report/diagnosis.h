@@ -86,7 +86,8 @@ struct SetAside {
     std::vector<uint64_t> examples;  // touch numbers
   };
   std::vector<Rows> rows;
-  int outliers = 0;  // among them
+  int outliers = 0;    // among them
+  std::string judged;  // a sentence of what outliers share, with a full stop; empty: there are none
 
   int count() const;
 };
@@ -146,6 +147,9 @@ struct Diagnosis {
   std::vector<std::string> superfluous;        // effects of the model that the data do without
   std::vector<DataProblem> data_problems;      // with kCheckData; no step is claimed beside them
   std::optional<model::Model> improved_model;  // none: nothing changed
+  // See v1::Report.
+  std::optional<double> p_nothing_missing;
+  int hypotheses_tried = 0;
   std::vector<NextMeasurement> next;
 
   std::string summary;                // one paragraph

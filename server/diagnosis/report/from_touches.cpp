@@ -80,6 +80,7 @@ void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   diagnosis->verdict = ladder.verdict;
   data.noise_floor = InMicroseconds(ladder.noise_floor);
   data.final = InMicroseconds(ladder.final);
+  data.set_aside.judged = ladder.set_aside.words;
   data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
   diagnosis->refitted = ladder.refitted;
   for (const engine::LadderStep& step : ladder.steps) {
@@ -100,7 +101,7 @@ void AddResiduals(residuals::ResidualSummary residuals, DataReport* data) {
   for (const residuals::ResidualCurve& curve : residuals.curves)
     data->curves.push_back(CurveOf(curve, data->fingers));
   data->finger_bias_s = std::move(residuals.grouped.finger_bias_s);
-  data->finger_scatter = residuals.finger_scatter;
+  if (!data->noise_floor || !data->noise_floor->is_rounding) data->finger_scatter = residuals.finger_scatter;
   data->worst_touches = std::move(residuals.worst_touches);
   data->histograms = std::move(residuals.histograms);
   data->parity = std::move(residuals.parity);

@@ -58,6 +58,8 @@ std::string HowWrong(const DataReport& data) {
   const double rmse = data.initial ? data.initial->rmse : 0;
   if (!data.noise_floor || !(data.noise_floor->sigma > 0))
     return absl::StrCat("The model is off by ", ErrorInWords(data.kind, rmse), ".");
+  if (data.noise_floor->is_rounding && rmse <= data.noise_floor->sigma)
+    return "The model agrees with the data to the rounding of files and meshes.";
   return absl::StrFormat(
       "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
       ErrorInWords(data.kind, rmse), ErrorInWords(data.kind, data.noise_floor->sigma),

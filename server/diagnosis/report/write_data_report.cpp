@@ -48,7 +48,8 @@ void WriteSetAside(const SetAside& set_aside, v1::SetAside* message) {
     words.push_back(absl::StrCat(unused.count, ": ", unused.reason));
   }
   message->set_count(Unsigned(set_aside.count()));
-  message->set_words(absl::StrJoin(words, "; "));
+  message->set_words(
+      absl::StrCat(absl::StrJoin(words, "; "), set_aside.judged.empty() ? "" : ". " + set_aside.judged));
   message->set_outliers(Unsigned(set_aside.outliers));
 }
 
@@ -60,6 +61,7 @@ void WriteErrors(const DataReport& data, v1::DataReport* message) {
     noise->set_lower(data.noise_floor->lower);
     noise->set_upper(data.noise_floor->upper);
     noise->set_from_repeats(data.noise_floor->from_repeats);
+    noise->set_is_rounding(data.noise_floor->is_rounding);
   }
   if (data.initial) WriteQuality(*data.initial, message->mutable_initial());
   for (const Quality& quality : data.after_step) WriteQuality(quality, message->add_after_step());
@@ -135,6 +137,7 @@ void WriteUnexplained(const Unexplained& rest, v1::Unexplained* message) {
   message->set_formula(rest.formula);
   message->set_formula_yaml(rest.formula_yaml);
   message->set_lookup_yaml(rest.lookup_yaml);
+  if (rest.model_with) message->set_model_yaml(model::FormatModel(*rest.model_with));
   message->set_heldout_gain(rest.heldout_gain);
   message->set_words(rest.words);
   WriteParameters(rest.parameters, message->mutable_parameters());

@@ -96,6 +96,8 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   report.set_model_hash(diagnosis.model_hash);
   WriteCauses(diagnosis, &report);
   for (const DataReport& data : diagnosis.data) *report.add_data() = ToMessage(data);
+  if (diagnosis.p_nothing_missing) report.set_p_nothing_missing(*diagnosis.p_nothing_missing);
+  report.set_hypotheses_tried(static_cast<uint32_t>(diagnosis.hypotheses_tried));
   if (diagnosis.improved_model) {
     report.set_improved_model_yaml(model::FormatModel(*diagnosis.improved_model));
     report.set_improved_model_hash(diagnosis.improved_model->Hash());

@@ -44,8 +44,9 @@ std::string UnusualValue(const model::Effect& effect, const engine::LadderStep& 
 
 }  // namespace
 
-void DoubtUnusualValues(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder) {
-  for (const engine::SelectedStep& selected : selection.steps) {
+void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                        Ladder* ladder) {
+  for (const engine::SelectedStep& selected : steps) {
     const model::Effect& effect = *fit.model.base().effects[selected.effect].effect;
     for (engine::LadderStep& step : ladder->steps) {
       if (step.effect != engine::NameOf(effect)) continue;
@@ -57,11 +58,11 @@ void DoubtUnusualValues(const engine::Fit& fit, const SelectionResult& selection
   }
 }
 
-Doubts DoubtsOf(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder) {
+Doubts DoubtsOf(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps, Ladder* ladder) {
   Doubts doubts;
   int effects = 0, near_typical = 0;
   std::vector<std::string> stopped;
-  for (const engine::SelectedStep& selected : selection.steps) {
+  for (const engine::SelectedStep& selected : steps) {
     ++effects;
     near_typical += SizeOverTypical(fit, selected.effect) <= kNearTypical;
     if (!engine::IsAtBound(fit, selected.effect)) continue;

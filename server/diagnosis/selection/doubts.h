@@ -18,9 +18,10 @@ struct Doubts {
 };
 
 // Of the steps that the ladder has so far; those at a bound say so in their words.
-Doubts DoubtsOf(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder);
+Doubts DoubtsOf(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps, Ladder* ladder);
 
 // Says of steps that they would need more than rigs show, and is less sure of them.
-void DoubtUnusualValues(const engine::Fit& fit, const SelectionResult& selection, Ladder* ladder);
+void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                        Ladder* ladder);
 
 }  // namespace touchstone::diagnosis::selection

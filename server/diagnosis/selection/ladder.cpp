@@ -2,10 +2,12 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/readable_time.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/candidate_ranking.h"
 #include "server/diagnosis/engine/findings.h"
@@ -16,6 +18,9 @@
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/touches_set_aside.h"
+#include "server/diagnosis/selection/unsupported_steps.h"
+#include "server/diagnosis/touches/ticks.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -45,43 +50,65 @@ absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit
   return whole;
 }
 
-// The error of every touch, noisy ones in full, as the steps and the final error count them; the held-out error keeps its
-// ratio.
-void SetErrors(const Workspace& workspace, const engine::Fit& fit, engine::RankedCandidate* candidate) {
-  const touches::Contrasts& contrasts = *workspace.contrasts;
-  const Eigen::VectorXd weighted = fit.columns.values.col(0);
-  double squares = 0;
-  for (int row = 0; row < contrasts.rows(); ++row) {
-    const double value = weighted[row] / contrasts.root_weights()[contrasts.touch_of_row()[row]];
-    squares += value * value;
-  }
-  const double rows = std::max<double>(1, static_cast<double>(weighted.size()));
-  const double weighted_rmse = std::sqrt(weighted.squaredNorm() / rows);
-  candidate->rmse = std::sqrt(squares / rows);
-  candidate->heldout_rmse = engine::HeldOutRmse(workspace.experiment, fit);
-  if (weighted_rmse > 0) candidate->heldout_rmse *= candidate->rmse / weighted_rmse;
+// The error as a comparison finds it; the held-out error keeps its ratio to the fit's.
+absl::Status SetErrors(const Workspace& workspace, const engine::Fit& fit,
+                       engine::RankedCandidate* candidate) {
+  const double fitted = std::sqrt(fit.columns.values.col(0).squaredNorm() /
+                                  std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
+  engine::Quality quality = {fitted, engine::HeldOutRmse(workspace.experiment, fit), 0};
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, fit.model.base()));
+  SetError(rmse_s, &quality);
+  candidate->rmse = quality.rmse;
+  candidate->heldout_rmse = std::max(quality.heldout_rmse, quality.rmse);
+  return absl::OkStatus();
+}
+
+// The steps by their effects' indices in the model without the formula.
+std::vector<engine::SelectedStep> StepsWithoutFormula(const SelectionResult& selection) {
+  std::vector<engine::SelectedStep> steps = selection.steps;
+  for (engine::SelectedStep& step : steps)
+    if (selection.formula >= 0 && step.effect > selection.formula) --step.effect;
+  return steps;
 }
 
 class LadderBuilder {
  public:
   LadderBuilder(const Workspace& workspace, const SelectionResult& selection)
-      : workspace_(workspace), selection_(selection) {}
+      : workspace_(workspace),
+        selection_(selection),
+        saved_(has_formula() ? selection.without_formula : selection.fit),
+        steps_(StepsWithoutFormula(selection)) {}
 
-  absl::StatusOr<Ladder> Build() {
+  // The effects with their errors. Returns the effect of the selection that is no step (engine::StepWithoutGain); -1: none.
+  absl::StatusOr<int> Climb() {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
-    DoubtUnusualValues(fit_, selection_, &ladder_);
-    doubts_ = DoubtsOf(fit_, selection_, &ladder_);
+    if (ladder_.steps.empty()) return -1;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const engine::Quality before,
+        QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
+    const int step = engine::StepWithoutGain(before, ladder_.steps);
+    if (step < 0) return -1;
+    const int effect = climbed_[step];
+    return effect + (has_formula() && effect >= selection_.formula);
+  }
+
+  absl::StatusOr<Ladder> Build() {
+    DoubtUnusualValues(fit_, steps_, &ladder_);
+    doubts_ = DoubtsOf(fit_, steps_, &ladder_);
     QuestionRounds();
-    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.final,
-                                QualityOf(workspace_, selection_.without_formula, ladder_.residuals));
-    left_ = ladder_.final;
-    TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, ladder_.improved, &ladder_.final));
+    ticks_ = touches::FindTouchTicks(*workspace_.observations);
+    TOUCHSTONE_ASSIGN_OR_RETURN(left_, QualityOf(workspace_, saved_, ladder_.residuals));
+    ladder_.final = left_;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double final_s, ErrorAsCompared(workspace_, ladder_.improved));
+    SetError(final_s, &ladder_.final);
+    ladder_.set_aside = JudgeTouchesSetAside(*workspace_.observations, ladder_.residuals, ladder_.final.rmse,
+                                             ladder_.noise_floor.sigma);
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
     const size_t steps = ladder_.steps.size();
-    if (!doubts_.remounted && !selection_.partial)
+    if (!doubts_.remounted && !selection_.partial && !ladder_.noise_floor.is_rounding)
       AddNoiseSteps(selection_.noise, selection_.memory.has_value(), &ladder_);
     if (rounds_.p < kRoundsPossibleP)
       for (size_t j = steps; j < ladder_.steps.size(); ++j) {
@@ -94,15 +121,15 @@ class LadderBuilder {
         ladder_.candidates,
         engine::RankCandidates(*selection_.search, selection_.initial_model, selection_.initial_effects,
                                [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
-                                 SetErrors(workspace_, fit, candidate);
-                                 return absl::OkStatus();
+                                 return SetErrors(workspace_, fit, candidate);
                                }));
     const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
-                      selection_.partial || unplaced_ || doubts_.any();
+                      selection_.partial || unplaced_ || doubts_.any() || ladder_.set_aside.is_finding ||
+                      ticks_.in_part();
     if (has_formula() || rest) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          ladder_.unexplained,
-          DescribeUnexplained(workspace_, selection_, ladder_.final, ladder_.noise_floor.sigma));
+      TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
+                                  DescribeUnexplained(workspace_, selection_, ladder_.final,
+                                                      ladder_.noise_floor.sigma, with_formula_));
       if (TimeStructureRemains() || Walks())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
@@ -121,22 +148,25 @@ class LadderBuilder {
  private:
   bool has_formula() const { return selection_.formula >= 0; }
 
-  // The improved model: everything but the formula; its residuals, and the noise floor.
+  // The improved model: everything but the formula, fitted without it; its residuals, and the noise floor of the best model.
   absl::Status Improve() {
     const touches::Observations& o = *workspace_.observations;
-    TOUCHSTONE_ASSIGN_OR_RETURN(fit_, FitAll(workspace_, selection_.fit));
-    model::Model whole = fit_.model.base();
-    engine::RoundValues(fit_, &whole);
-    ladder_.improved = whole;
-    if (has_formula()) ladder_.improved.effects.erase(ladder_.improved.effects.begin() + selection_.formula);
-    ladder_.changed = !selection_.steps.empty();
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven());
+    TOUCHSTONE_ASSIGN_OR_RETURN(fit_, FitAll(workspace_, saved_));
+    ladder_.improved = fit_.model.base();
+    engine::RoundValues(fit_, &ladder_.improved);
+    ladder_.changed = !steps_.empty();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> superfluous, DescribeGiven());
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
     ladder_.residuals = touches::Residuals(o, ladder_.prediction);
     std::vector<double> best = ladder_.residuals;
     if (has_formula()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Fit whole, FitAll(workspace_, selection_.fit));
+      with_formula_ = whole.model.base();
+      engine::RoundValues(whole, &*with_formula_);
+      for (const int index : superfluous)
+        with_formula_->effects.erase(with_formula_->effects.begin() + index);
       TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
-                                  workspace_.predictor->Run(whole, false, false));
+                                  workspace_.predictor->Run(*with_formula_, false, false));
       best = touches::Residuals(o, with);
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, fit_.model.size());
@@ -147,10 +177,11 @@ class LadderBuilder {
   }
 
   // Values of the given model's effects that were set free: new ones, or zero as far as the data can tell.
-  absl::Status DescribeGiven() {
+  // Returns the latter, largest index first.
+  absl::StatusOr<std::vector<int>> DescribeGiven() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         engine::GivenEffects given,
-        engine::DescribeGivenEffects(workspace_.experiment, selection_.fit, fit_, fit_.covariance,
+        engine::DescribeGivenEffects(workspace_.experiment, saved_, fit_, fit_.covariance,
                                      *workspace_.input.model, workspace_.observations->objects));
     for (const int index : given.superfluous)
       ladder_.improved.effects.erase(ladder_.improved.effects.begin() + index);
@@ -158,14 +189,13 @@ class LadderBuilder {
     ladder_.changed |= given.changed();
     ladder_.superfluous = std::move(given.superfluous_names);
     ladder_.refitted = std::move(given.refitted);
-    return absl::OkStatus();
+    return given.superfluous;
   }
 
   absl::Status DescribeSteps() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const std::vector<engine::OrderedStep> ordered,
-        engine::OrderSteps(workspace_.experiment, {selection_.fit, selection_.initial_effects},
-                           selection_.formula, selection_.steps));
+        engine::OrderSteps(workspace_.experiment, {saved_, selection_.initial_effects}, -1, steps_));
     for (const engine::OrderedStep& step : ordered) TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(step));
     return absl::OkStatus();
   }
@@ -173,13 +203,9 @@ class LadderBuilder {
   absl::Status DescribeStep(const engine::OrderedStep& ordered) {
     engine::LadderStep step = engine::DescribeStep(fit_, fit_.covariance, *ordered.step);
     engine::AddConfounded(step, &ladder_.confounded);
-    step.model = ordered.fit.model.base();
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.predictor->Run(step.model, false, false));
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        step.quality,
-        QualityOf(workspace_, ordered.fit, touches::Residuals(*workspace_.observations, prediction)));
-    TOUCHSTONE_RETURN_IF_ERROR(SetErrorsAsCompared(workspace_, step.model, &step.quality));
+    step.model = ordered.whole ? ladder_.improved : ordered.fit.model.base();
+    TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOfModel(workspace_, ordered.fit, step.model));
+    climbed_.push_back(ordered.step->effect);
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
   }
@@ -249,11 +275,22 @@ class LadderBuilder {
       return "The fingers wander through the whole session, and nothing shows that they come back: a walk, "
              "or noise "
              "whose memory is as long as the session. Find what moves, or make a longer session.";
-    const std::string words = unplaced_ ? support_.WordsOfRest() : doubts_.words;
+    const std::string words = unplaced_                      ? support_.WordsOfRest()
+                              : doubts_.any()                ? doubts_.words
+                              : ladder_.set_aside.is_finding ? ladder_.set_aside.words
+                              : ticks_.in_part()             ? TicksInWords()
+                                                             : "";
     if (!selection_.curve || selection_.curve->words.empty()) return words;
     std::string course = absl::StrCat(selection_.curve->words, ".");
     course[0] = absl::ascii_toupper(course[0]);
     return words.empty() ? course : absl::StrCat(course, " ", words);
+  }
+
+  std::string TicksInWords() const {
+    return absl::StrFormat(
+        "The times of %d of %d touches lie on ticks of %s, those of the others do not: they were read in two "
+        "ways.",
+        ticks_.touches, ticks_.compared, TimeInWords(ticks_.interval_s));
   }
 
   // Of the mean square error that is no noise, what the steps take away.
@@ -268,19 +305,30 @@ class LadderBuilder {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
-  engine::Fit fit_;       // on all touches
+  const engine::Fit& saved_;  // without the formula, on the touches of the search
+  const std::vector<engine::SelectedStep> steps_;
+  std::vector<int> climbed_;  // the effect of each of the ladder's steps, by its index in saved_
+  engine::Fit fit_;           // as saved_, on all touches
+  std::optional<model::Model> with_formula_;
   engine::Quality left_;  // on the touches that the fits used: what the verdict is about
   Doubts doubts_;
   RoundStructure rounds_;
   SurfaceSupport support_;
+  touches::TouchTicks ticks_;
   bool unplaced_ = false;  // a misfit repeats with the pose, but not with the place on the surface
   Ladder ladder_;
 };
 
 }  // namespace
 
-absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionResult& selection) {
-  return LadderBuilder(workspace, selection).Build();
+absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* selection) {
+  for (;;) {
+    LadderBuilder builder(workspace, *selection);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int effect, builder.Climb());
+    if (effect < 0) return builder.Build();
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, effect, selection));
+    TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(selection));
+  }
 }
 
 }  // namespace touchstone::diagnosis::selection

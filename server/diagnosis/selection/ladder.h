@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/set_aside.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/selection.h"
 
@@ -22,6 +23,7 @@ struct Ladder {
   std::vector<engine::ConfoundedEffects> confounded;
   std::vector<engine::RankedCandidate> candidates;  // best first
   std::optional<engine::UnexplainedRest> unexplained;
+  engine::SetAside set_aside;  // outliers
 
   model::Model improved;           // the initial model with steps and refits, without a formula
   bool changed = false;            // improved differs from the initial model
@@ -30,7 +32,8 @@ struct Ladder {
   touches::Prediction prediction;  // of the improved model, with details
 };
 
-absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, const SelectionResult& selection);
+// Takes steps out of the selection with which the error, as a comparison finds it, does not fall.
+absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* selection);
 
 // Its parts.
 
@@ -46,9 +49,11 @@ void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);
 
 // What depends on which covariate where no named effect explains it, and a formula, if one was found. `final`:
-// errors after all steps, `floor_s`: of the noise.
+// errors after all steps, `floor_s`: of the noise; `with`: the improved model with the formula in its place; nothing: none
+// was found.
 absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                             const SelectionResult& selection,
-                                                            const engine::Quality& final, double floor_s);
+                                                            const engine::Quality& final, double floor_s,
+                                                            std::optional<model::Model> with);
 
 }  // namespace touchstone::diagnosis::selection

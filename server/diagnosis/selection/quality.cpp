@@ -12,11 +12,12 @@ namespace {
 
 constexpr double kMinDegreesOfFreedom = 8;
 
-// Held-out error over error, on the touches of the search.
+// Held-out error over error, on the touches of the search. By least squares it is at least 1; weights that differ between
+// the two must not make it less.
 double RatioOf(const engine::Fit& fit, double heldout_rmse_s) {
   const double rmse_s = std::sqrt(fit.columns.values.col(0).squaredNorm() /
                                   std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  return rmse_s > 0 ? heldout_rmse_s / rmse_s : 1;
+  return rmse_s > 0 ? std::max(heldout_rmse_s / rmse_s, 1.0) : 1;
 }
 
 // Without repeats: how much better a smooth remainder explains the residuals than none.
@@ -27,6 +28,14 @@ double SmoothRemainderP(const Workspace& workspace, const engine::Fit& fit) {
 
 }  // namespace
 
+double RoundingS(const touches::Observations& o) {
+  double squares = 0, count = 0;
+  for (int k = 0; k < o.size(); ++k)
+    if (const double speed_m_s = o.set->speed_m_s[o.row[k]]; o.used[k] && speed_m_s > 0)
+      squares += 1 / (speed_m_s * speed_m_s), count += 1;
+  return count > 0 ? kRoundingM * std::sqrt(squares / count) : 0;
+}
+
 bool HasRepeats(const touches::SumOfSquares& error) {
   return error.degrees_of_freedom >= kMinDegreesOfFreedom;
 }
@@ -34,9 +43,10 @@ bool HasRepeats(const touches::SumOfSquares& error) {
 double LackOfFitP(const touches::Observations& o, const std::vector<double>& residuals, double parameters) {
   const touches::SumOfSquares pure = PureErrorOf(o, residuals), total = touches::TotalSquares(o, residuals);
   const double dof = total.degrees_of_freedom - pure.degrees_of_freedom - parameters;
-  if (!HasRepeats(pure) || dof < 1 || !(pure.sum_of_squares > 0)) return 1;
-  const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / dof /
-                   (pure.sum_of_squares / pure.degrees_of_freedom);
+  const double noise =
+      std::max(std::sqrt(pure.sum_of_squares / std::max(pure.degrees_of_freedom, 1.0)), RoundingS(o));
+  if (!HasRepeats(pure) || dof < 1 || !(noise > 0)) return 1;
+  const double f = std::max(total.sum_of_squares - pure.sum_of_squares, 0.0) / dof / (noise * noise);
   return FisherTail(f, dof, pure.degrees_of_freedom);
 }
 
@@ -73,11 +83,16 @@ void SetError(double rmse_s, engine::Quality* quality) {
   quality->rmse = rmse_s;
 }
 
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model,
-                                 engine::Quality* quality) {
+absl::StatusOr<engine::Quality> QualityOfModel(const Workspace& workspace, const engine::Fit& fit,
+                                               const model::Model& model) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                              workspace.predictor->Run(model, false, false));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      engine::Quality quality,
+      QualityOf(workspace, fit, touches::Residuals(*workspace.observations, prediction)));
   TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, model));
-  SetError(rmse_s, quality);
-  return absl::OkStatus();
+  SetError(rmse_s, &quality);
+  return quality;
 }
 
 engine::Quality QualityWithoutSurface(const Workspace& workspace, const engine::Fit& fit) {
@@ -103,7 +118,10 @@ engine::NoiseFloor NoiseFloorOf(const touches::Observations& o, const std::vecto
   }
   floor.degrees_of_freedom = error.degrees_of_freedom;
   if (error.degrees_of_freedom > 0) floor.sigma = std::sqrt(error.sum_of_squares / error.degrees_of_freedom);
-  if (error.degrees_of_freedom >= 1) {
+  if (const double rounding_s = RoundingS(o); floor.sigma < rounding_s) {
+    floor.sigma = rounding_s;
+    floor.is_rounding = true;
+  } else if (error.degrees_of_freedom >= 1) {
     const auto bound_s = [&](double p) {
       return floor.sigma *
              std::sqrt(error.degrees_of_freedom / ChiSquaredQuantile(p, error.degrees_of_freedom));

@@ -6,6 +6,9 @@
 
 namespace touchstone::diagnosis::selection {
 
+// What times are off by because numbers of files and meshes are rounded (kRoundingM), s: the least that a floor can be.
+double RoundingS(const touches::Observations& observations);
+
 // F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without repeats or
 // without degrees of freedom.
 double LackOfFitP(const touches::Observations& observations, const std::vector<double>& residuals,
@@ -22,16 +25,16 @@ absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engi
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
+// Of `model`, which has the values of a fit to the touches of the search: as compared, and as QualityOf.
+absl::StatusOr<engine::Quality> QualityOfModel(const Workspace& workspace, const engine::Fit& fit,
+                                               const model::Model& model);
+
 // The same of the model as it was given; `residuals`: of every touch that takes part.
 engine::Quality QualityAsCompared(const touches::Observations& observations,
                                   const std::vector<double>& residuals);
 
 // Another error, s, of the same fit; the held-out error keeps its ratio to it.
 void SetError(double rmse_s, engine::Quality* quality);
-
-// Sets the errors of `quality` to those of `model` as a comparison finds them.
-absl::Status SetErrorsAsCompared(const Workspace& workspace, const model::Model& model,
-                                 engine::Quality* quality);
 
 // The same for what the fit's surface error leaves, on the touches of the search.
 engine::Quality QualityWithoutSurface(const Workspace& workspace, const engine::Fit& fit);

@@ -10,6 +10,7 @@
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/declared_noise.h"
+#include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
 
@@ -121,14 +122,14 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
   return CompeteWithCurves(workspace, result);
 }
 
+}  // namespace
+
 absl::Status FindCompetingEffects(SelectionResult* result) {
   const engine::Explanation whole{result->fit, result->initial_effects};
   TOUCHSTONE_ASSIGN_OR_RETURN(
       result->steps, engine::FindCompetitors(*result->search, whole, result->formula, result->curve_rivals));
   return absl::OkStatus();
 }
-
-}  // namespace
 
 std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const engine::Fit& fit) {
   const touches::Contrasts& contrasts = *workspace.contrasts;
@@ -206,12 +207,16 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   const auto progress = [workspace](const std::string& what) {
     if (workspace->context.progress) workspace->context.progress(what, 0);
   };
+  engine::NothingMissing nothing_missing;
   for (int pass = 0; pass < kPasses; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
     result = SelectionResult();
     result.search = std::make_unique<engine::StepwiseSearch>(
         workspace->experiment, MakeCandidates(workspace->input, *workspace->searched), engine::SearchRules(),
         progress);
+    if (pass == 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(nothing_missing, TestNothingMissing(*workspace, *result.search));
+    }
     TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, &result));
     TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
     if (pass + 1 == kPasses) break;
@@ -219,6 +224,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
                                 ReviseTouches(result.fit, result.noise, workspace, &weights));
     if (!revised) break;
   }
+  result.nothing_missing = nothing_missing;
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
   TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));

@@ -11,6 +11,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/selection/formula_terms.h"
 #include "server/diagnosis/selection/nameless_curve.h"
 #include "server/diagnosis/selection/noise_memory.h"
@@ -40,12 +41,16 @@ struct SelectionResult {
   std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
   std::map<std::string, engine::NamelessRival> curve_rivals;  // by the effect whose place they would take
   std::vector<engine::SelectedStep> steps;
+  engine::NothingMissing nothing_missing;  // of the model as it was given, over all that is tried
   touches::NoiseFindings noise;
   std::optional<NoiseMemory>
       memory;  // the wander that the residuals follow, where no curve describes them better
   std::optional<PartialOffset> partial;  // that a part of the touches has: no effect is named in its place
   SurfaceErrorFinding surface_error;
 };
+
+// What competes with each step of the explanation as it stands.
+absl::Status FindCompetingEffects(SelectionResult* result);
 
 // Leaves touches out of workspace->observations (edges, outliers) and weighs the rest as the noise asks for.
 absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace);

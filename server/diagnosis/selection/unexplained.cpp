@@ -78,10 +78,8 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
   rest->formula = instance.effect->formula->expression;
   rest->formula_yaml = FormulaYaml(fit, selection.formula);
   rest->parameters = fit.model.Describe(selection.formula, fit.point, fit.covariance);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
-                              workspace.predictor->Run(fit.model.base(), false, false));
   TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Quality quality,
-                              QualityOf(workspace, fit, touches::Residuals(*workspace.observations, with)));
+                              QualityOfModel(workspace, fit, *rest->model_with));
   rest->rmse = quality.rmse;
   rest->heldout_rmse = quality.heldout_rmse;
   const double before = std::pow(final.heldout_rmse, 2) - floor_s * floor_s;
@@ -94,10 +92,7 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
 absl::Status DescribeCurve(const Workspace& workspace, const SelectionResult& selection,
                            const engine::Quality& final, double floor_s, engine::UnexplainedRest* rest) {
   const NamelessCurve& curve = *selection.curve;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
-                              workspace.predictor->Run(selection.fit.model.base(), false, false));
-  const touches::Observations& o = *workspace.observations;
-  rest->rmse = touches::Rmse(o, touches::Residuals(o, with));
+  TOUCHSTONE_ASSIGN_OR_RETURN(rest->rmse, ErrorAsCompared(workspace, *rest->model_with));
   const double in_sample = std::sqrt(selection.fit.columns.values.col(0).squaredNorm() /
                                      std::max<double>(1, selection.fit.columns.values.rows()));
   const double ratio = in_sample > 0 ? std::max(1.0, curve.heldout_with_s / in_sample) : 1;
@@ -181,7 +176,8 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
 
 absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                             const SelectionResult& selection,
-                                                            const engine::Quality& final, double floor_s) {
+                                                            const engine::Quality& final, double floor_s,
+                                                            std::optional<model::Model> with) {
   std::vector<FormulaTerm> terms = selection.terms;
   if (terms.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
@@ -190,6 +186,7 @@ absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& wor
   }
   const bool has_formula = selection.formula >= 0;
   engine::UnexplainedRest rest;
+  rest.model_with = std::move(with);
   rest.covariates = TestCovariates(terms, has_formula ? selection.term.covariate : "");
   AddCurves(selection, &rest.covariates);
   if (selection.curve) {

@@ -17,8 +17,8 @@ double UnseenError(const Workspace& workspace, const engine::Fit& fit, bool by_b
                   : engine::HeldOutRmse(workspace.experiment, fit);
 }
 
-// The explanation without effect `index`, everything else fitted anew.
-absl::Status TakeOut(const Workspace& workspace, int index, engine::Fit without, SelectionResult* result) {
+// `without`: the fit without effect `index`.
+absl::Status Replace(const Workspace& workspace, int index, engine::Fit without, SelectionResult* result) {
   result->fit = std::move(without);
   if (result->formula < 0) {
     result->without_formula = result->fit;
@@ -33,6 +33,12 @@ absl::Status TakeOut(const Workspace& workspace, int index, engine::Fit without,
 
 }  // namespace
 
+absl::Status TakeOut(const Workspace& workspace, int index, SelectionResult* result) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
+                              engine::FitModel(workspace.experiment, result->fit.model.Without(index)));
+  return Replace(workspace, index, std::move(without), result);
+}
+
 absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
   for (int index = static_cast<int>(result->fit.model.base().effects.size()) - 1;
        index >= result->initial_effects; --index) {
@@ -44,7 +50,7 @@ absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
     for (int other = 0; other < static_cast<int>(result->fit.model.base().effects.size()); ++other)
       by_block |= HasOwnValues(result->fit, other);
     if (UnseenError(workspace, without, by_block) > UnseenError(workspace, result->fit, by_block)) continue;
-    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, index, std::move(without), result));
+    TOUCHSTONE_RETURN_IF_ERROR(Replace(workspace, index, std::move(without), result));
   }
   return absl::OkStatus();
 }
@@ -54,9 +60,7 @@ absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult*
   bool dropped = false;
   for (auto step = result->steps.rbegin(); step != result->steps.rend(); ++step) {
     if (step->probability >= kImprobable) continue;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        engine::Fit without, engine::FitModel(workspace.experiment, result->fit.model.Without(step->effect)));
-    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, step->effect, std::move(without), result));
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, step->effect, result));
     dropped = true;
   }
   return dropped;

@@ -14,4 +14,7 @@ absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result);
 // Returns whether there were any: the steps are then to be found anew.
 absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult* result);
 
+// Takes effect `index` of the explanation out; everything else is fitted anew.
+absl::Status TakeOut(const Workspace& workspace, int index, SelectionResult* result);
+
 }  // namespace touchstone::diagnosis::selection

@@ -22,7 +22,6 @@ constexpr double kUnitFactor = 100;  // measured over predicted spread that no e
 constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
 constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
 constexpr int kMinRepeats = 4;         // of a pose that is searched: its scatter tells noise from misfit
-constexpr double kFloorM = 0.3e-6;     // what mesh files and CSV numbers are rounded to, about
 
 // A mesh that most touches miss is not the mesh that was touched.
 absl::Status CheckMeshes(const touches::Observations& o, const touches::Prediction& nominal,
@@ -180,7 +179,7 @@ touches::SumOfSquares PureErrorOf(const touches::Observations& o, const std::vec
   for (const auto& [key, group] : groups) {
     double mean_squares = 0;
     for (const double sum : group.sum) mean_squares += sum * sum / group.touches;
-    error.sum_of_squares += group.squares - mean_squares;
+    error.sum_of_squares += std::max(group.squares - mean_squares, 0.0);  // equal repeats: rounding
     error.degrees_of_freedom += static_cast<double>(group.members - 1) * (group.touches - 1);
   }
   return error;
@@ -280,7 +279,7 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
       touches::SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
   workspace->likelihood = std::make_unique<engine::Likelihood>(
       touches::FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())),
-      &geometry, kFloorM * slope, workspace->context.pool);
+      &geometry, kRoundingM * slope, workspace->context.pool);
   workspace->rows = std::make_unique<touches::TouchObservationModel>(
       searched, *workspace->searched_predictor, *workspace->contrasts, workspace->searched_nominal.time_s);
   engine::Experiment& experiment = workspace->experiment;

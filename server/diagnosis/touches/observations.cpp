@@ -115,6 +115,7 @@ void LeaveOut(Observations* observations, int k, const std::string& reason) {
   observations->used[k] = 0;
   UnusedTouches& unused = observations->unused[reason];
   ++unused.count;
+  if (reason == kOutlierReason) observations->outliers.push_back(k);
   if (unused.examples.size() < kMaxExamples)
     unused.examples.push_back(observations->set->touch[observations->row[k]]);
 }

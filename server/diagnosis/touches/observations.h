@@ -33,6 +33,7 @@ struct Observations {
   std::vector<char> used;      // 0: left out of every fit and error (edge contacts, outliers, ...)
   std::vector<int> previous;   // the session's previous touch; -1: none
   std::map<std::string, UnusedTouches> unused;  // by reason
+  std::vector<int> outliers;                    // touches k that were left out for kOutlierReason
 
   int size() const { return static_cast<int>(row.size()); }
 };

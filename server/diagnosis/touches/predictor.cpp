@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <optional>
 
 #include "server/base/status.h"
 #include "server/effects/surface_departure.h"
@@ -92,13 +93,16 @@ void Predictor::ForBlocks(const std::vector<Block>& blocks,
 // One prediction under way: simulation block by block, then copies for the repeats of a pose.
 class Predictor::Task {
  public:
-  Task(const Predictor& predictor, const model::Model& model, bool details, bool curvature)
+  // `noise_seed`: of the random effects; nothing: there are none.
+  Task(const Predictor& predictor, const model::Model& model, bool details, bool curvature,
+       std::optional<uint64_t> noise_seed = {})
       : predictor_(predictor),
         o_(predictor.observations_),
         details_(details),
         curvature_(curvature && details),
-        model_(DeterministicPart(model)),
-        every_touch_(DependsOnSession(model_)),
+        noise_seed_(noise_seed),
+        model_(noise_seed ? model : DeterministicPart(model)),
+        every_touch_(noise_seed || DependsOnSession(model_)),
         simulator_(std::make_shared<const model::Model>(WithCurvature())),
         blocks_(every_touch_ ? predictor.touch_blocks_ : predictor.pose_blocks_) {}
 
@@ -151,7 +155,12 @@ class Predictor::Task {
     status_ = std::move(status);
   }
 
-  bool SimulateToMotion(const Block& block, effects::TouchBatch* batch, touch::TouchWorkspace* workspace) {
+  void Fill(const Block& block, effects::TouchBatch* batch) const {
+    predictor_.Fill(block, simulator_, batch);
+    batch->seed = noise_seed_.value_or(0);
+  }
+
+  bool SimulateToMotion(effects::TouchBatch* batch, touch::TouchWorkspace* workspace) {
     absl::Status ran = simulator_.RunToMotion(batch, workspace);
     if (!ran.ok()) Fail(ran);
     return ran.ok();
@@ -163,8 +172,8 @@ class Predictor::Task {
     predictor_.ForBlocks(blocks_, [this](const Block& block) {
       thread_local effects::TouchBatch batch;
       thread_local touch::TouchWorkspace workspace;
-      predictor_.Fill(block, simulator_, &batch);
-      if (!SimulateToMotion(block, &batch, &workspace)) return;
+      Fill(block, &batch);
+      if (!SimulateToMotion(&batch, &workspace)) return;
       for (size_t t = 0; t < block.touches.size(); ++t)
         for (int i = 0; i < o_.fingers; ++i)
           presses_m_[Entry(block.touches[t], i)] = batch.press_m[batch.At(i, static_cast<int>(t))];
@@ -178,13 +187,13 @@ class Predictor::Task {
   void Simulate(const Block& block) {
     thread_local effects::TouchBatch batch;
     thread_local touch::TouchWorkspace workspace;
-    predictor_.Fill(block, simulator_, &batch);
+    Fill(block, &batch);
     for (size_t t = 0; t < block.touches.size() && simulator_.needs_previous_press(); ++t) {
       const int previous = o_.previous[block.touches[t]];
       for (int i = 0; i < o_.fingers && previous >= 0; ++i)
         batch.previous_press_m[batch.At(i, static_cast<int>(t))] = presses_m_[Entry(previous, i)];
     }
-    if (!SimulateToMotion(block, &batch, &workspace)) return;
+    if (!SimulateToMotion(&batch, &workspace)) return;
     if (absl::Status ran = simulator_.RunSensor(&batch, &workspace); !ran.ok()) return Fail(std::move(ran));
     for (size_t t = 0; t < block.touches.size(); ++t) Keep(batch, static_cast<int>(t), block.touches[t]);
   }
@@ -232,6 +241,7 @@ class Predictor::Task {
   const Predictor& predictor_;
   const Observations& o_;
   const bool details_, curvature_;
+  const std::optional<uint64_t> noise_seed_;
   const model::Model model_;
   const bool every_touch_;  // else one touch per pose
   const touch::TouchSimulator simulator_;
@@ -244,6 +254,11 @@ class Predictor::Task {
 
 absl::StatusOr<Prediction> Predictor::Run(const model::Model& model, bool details, bool curvature) const {
   return Task(*this, model, details, curvature).Run();
+}
+
+absl::StatusOr<std::vector<double>> Predictor::Draw(const model::Model& model, uint64_t seed) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(Prediction drawn, Task(*this, model, false, false, seed).Run());
+  return std::move(drawn.time_s);
 }
 
 absl::StatusOr<std::vector<double>> Predictor::TravelWhenMoved(const model::Model& model,

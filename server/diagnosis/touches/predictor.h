@@ -20,6 +20,9 @@ class Predictor {
   // See Predict. Touches of one pose are simulated once, unless the model depends on the session's course.
   absl::StatusOr<Prediction> Run(const model::Model& model, bool details, bool curvature) const;
 
+  // Times as a rig of this model would report them, random effects included. [k * fingers + finger]
+  absl::StatusOr<std::vector<double>> Draw(const model::Model& model, uint64_t seed) const;
+
   // Contact travel of every touch with the whole end effector moved by `along_lateral_m` along the lateral
   // vector and by `along_binormal_m` along approach x lateral. [k * fingers + finger]
   absl::StatusOr<std::vector<double>> TravelWhenMoved(const model::Model& model, double along_lateral_m,

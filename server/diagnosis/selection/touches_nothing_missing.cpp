@@ -1,0 +1,230 @@
+#include "server/diagnosis/selection/touches_nothing_missing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "server/base/random.h"
+#include "server/base/status.h"
+#include "server/diagnosis/selection/nameless_curve.h"
+#include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/touches/noise_sample.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr int kDraws = 199, kSimulatedDraws = 99;
+constexpr int kCurveDegree = 3;
+
+// Whether the model says more of the noise than that it is normal and the same for all.
+bool HasShapedNoise(const model::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const model::EffectInstance& instance) {
+    return instance.effect->random() && instance.effect->role != model::EffectRole::kNoiseLevel &&
+           instance.effect->role != model::EffectRole::kDropout;
+  });
+}
+
+// The given model without dropouts: which fingers report is the data's.
+model::Model WithoutDropouts(model::Model model) {
+  model.effects.erase(std::remove_if(model.effects.begin(), model.effects.end(),
+                                     [](const model::EffectInstance& instance) {
+                                       return instance.effect->role == model::EffectRole::kDropout;
+                                     }),
+                      model.effects.end());
+  return model;
+}
+
+class Tester {
+ public:
+  Tester(const Workspace& workspace, const engine::StepwiseSearch& search)
+      : workspace_(workspace),
+        search_(search),
+        o_(*workspace.searched),
+        contrasts_(*workspace.contrasts),
+        initial_effects_(static_cast<int>(workspace.input.model->effects.size())) {}
+
+  absl::StatusOr<engine::NothingMissing> Run() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        fit_, engine::FitModel(workspace_.experiment,
+                               engine::Parameterization(*workspace_.input.model, o_.objects), 0));
+    TOUCHSTONE_RETURN_IF_ERROR(AddEffects());
+    TOUCHSTONE_ASSIGN_OR_RETURN(details_,
+                                workspace_.searched_predictor->Run(*workspace_.input.model, true, true));
+    AddCurves();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd residuals, DataAndDraws());
+    // What is left is less than numbers are rounded to: it has no noise, and its pattern is that of rounding.
+    const double rms_s = std::sqrt(fit_.columns.values.col(0).squaredNorm() / std::max(contrasts_.rows(), 1));
+    if (rms_s < RoundingS(o_)) return engine::NothingMissing{1, hypotheses_.size()};
+    const Eigen::MatrixXd linear = hypotheses_.PValues(residuals);
+    const Eigen::MatrixXd others = engine::PValuesOfStatistics(Statistics(residuals));
+    Eigen::MatrixXd p_values(linear.rows() + others.rows(), residuals.cols());
+    p_values << linear, others;
+    return engine::WorstOfAll(p_values);
+  }
+
+ private:
+  absl::Status AddEffects() {
+    std::map<std::string, Eigen::MatrixXd> of_effect;  // on all objects alike
+    const int own = fit_.model.size();
+    for (const engine::Extension& extension : search_.ListExtensions(fit_, initial_effects_)) {
+      const bool by_object = extension.candidate >= 0 && extension.start.size() > own &&
+                             !extension.start.parameters().back().object.empty();
+      const auto shared = of_effect.find(extension.name);
+      if (!by_object || shared == of_effect.end()) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
+                                    engine::Derivatives(workspace_.experiment, extension.start,
+                                                        extension.start.Start(), fit_.predicted, own));
+        hypotheses_.Add(columns);
+        if (extension.candidate >= 0 && !by_object) of_effect.emplace(extension.name, columns);
+        continue;
+      }
+      if (extension.object.empty()) {
+        hypotheses_.Add(OnEachObject(shared->second));
+        continue;
+      }
+      const int object = static_cast<int>(std::find(o_.objects.begin(), o_.objects.end(), extension.object) -
+                                          o_.objects.begin());
+      const int first = contrasts_.FirstRowOfObject(object);
+      hypotheses_.Add(shared->second.middleRows(first, contrasts_.FirstRowOfObject(object + 1) - first),
+                      first);
+    }
+    return absl::OkStatus();
+  }
+
+  // A value per object.
+  Eigen::MatrixXd OnEachObject(const Eigen::MatrixXd& columns) const {
+    const int objects = static_cast<int>(o_.objects.size());
+    Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(columns.rows(), objects * columns.cols());
+    for (int object = 0; object < objects; ++object) {
+      const int first = contrasts_.FirstRowOfObject(object);
+      const int rows = contrasts_.FirstRowOfObject(object + 1) - first;
+      apart.block(first, object * columns.cols(), rows, columns.cols()) = columns.middleRows(first, rows);
+    }
+    return apart;
+  }
+
+  // Polynomials of one covariate, of each finger by itself: travel that a curve adds.
+  void AddCurves() {
+    for (const CurveCovariate& covariate : ListCurveCovariates(o_, details_)) {
+      const auto [mean, deviation] = MeanAndDeviation(covariate);
+      if (!(deviation > 0)) continue;
+      Eigen::MatrixXd columns(contrasts_.rows(), o_.fingers * (kCurveDegree + 1));
+      std::vector<double> per_finger(o_.time_s.size());
+      for (int finger = 0; finger < o_.fingers; ++finger)
+        for (int degree = 0; degree <= kCurveDegree; ++degree) {
+          for (int k = 0; k < o_.size(); ++k)
+            for (int i = 0; i < o_.fingers; ++i) {
+              const size_t e = static_cast<size_t>(k) * o_.fingers + i;
+              const double value = (covariate.value(k, i) - mean) / deviation;
+              per_finger[e] = i == finger && std::isfinite(value)
+                                  ? std::pow(value, degree) * details_.inverse_speed_s_per_m[e]
+                                  : 0;
+            }
+          columns.col(finger * (kCurveDegree + 1) + degree) = contrasts_.Apply(per_finger);
+        }
+      hypotheses_.Add(columns);
+    }
+  }
+
+  std::pair<double, double> MeanAndDeviation(const CurveCovariate& covariate) const {
+    double count = 0, sum = 0, squares = 0;
+    for (const int k : contrasts_.touches())
+      for (int i = 0; i < o_.fingers; ++i)
+        if (const double value = covariate.value(k, i); std::isfinite(value))
+          count += 1, sum += value, squares += value * value;
+    if (count == 0) return {0, 0};
+    return {sum / count, std::sqrt(std::max(squares / count - sum * sum / count / count, 0.0))};
+  }
+
+  // The residual of the data, then of draws from the given model; columns.
+  absl::StatusOr<Eigen::MatrixXd> DataAndDraws() const {
+    const bool shaped = HasShapedNoise(*workspace_.input.model);
+    const int draws = shaped ? kSimulatedDraws : kDraws;
+    Eigen::MatrixXd residuals(contrasts_.rows(), 1 + draws);
+    residuals.col(0) = fit_.columns.values.col(0);
+    const model::Model drawn_from = WithoutDropouts(*workspace_.input.model);
+    for (int draw = 1; draw <= draws; ++draw) {
+      if (!shaped) {
+        RandomStream random(workspace_.input.seed, RandomDomain::kDiagnosis, draw);
+        for (int row = 0; row < contrasts_.rows(); ++row) residuals(row, draw) = random.Normal();
+        continue;
+      }
+      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> noise_s,
+                                  workspace_.searched_predictor->Draw(drawn_from, draw));
+      for (size_t e = 0; e < noise_s.size(); ++e) {
+        noise_s[e] -= workspace_.searched_nominal.time_s[e];
+        if (!std::isfinite(noise_s[e])) noise_s[e] = 0;
+      }
+      residuals.col(draw) = contrasts_.Apply(noise_s);
+    }
+    return residuals;
+  }
+
+  // What the noise looks like and what repeats share, of each draw (columns), whatever its size.
+  Eigen::MatrixXd Statistics(const Eigen::MatrixXd& residuals) const {
+    const std::vector<double> tangents = touches::TangentsOfIncidence(details_);
+    const int count = static_cast<int>(contrasts_.touches().size());
+    Eigen::MatrixXd statistics = Eigen::MatrixXd::Zero(o_.fingers + 5, residuals.cols());
+    std::vector<double> steepness(count), moment(count);
+    for (int t = 0; t < count; ++t) {
+      const int k = contrasts_.touches()[t];
+      moment[t] = k;
+      for (int i = 0; i < o_.fingers; ++i)
+        if (contrasts_.TakesPart(t, i))
+          steepness[t] = std::max(steepness[t], tangents[static_cast<size_t>(k) * o_.fingers + i]);
+    }
+    Centre(&steepness), Centre(&moment);
+    for (int draw = 0; draw < residuals.cols(); ++draw) {
+      const Eigen::VectorXd r = residuals.col(draw) / std::max(residuals.col(draw).norm(), 1e-300);
+      auto statistic = statistics.col(draw);
+      std::vector<Eigen::VectorXd> mean(o_.poses);
+      std::vector<int> repeats(o_.poses, 0);
+      for (int t = 0; t < count; ++t) {
+        const int first = contrasts_.FirstRow(t), rows = contrasts_.FirstRow(t + 1) - first;
+        const Eigen::VectorXd own = r.segment(first, rows);
+        const double square = own.squaredNorm();
+        const Eigen::VectorXd fingers = contrasts_.MatrixOf(t).transpose() * own;
+        for (int i = 0; i < o_.fingers; ++i) statistic[i] += fingers[i] * fingers[i];
+        statistic[o_.fingers] += square * steepness[t];
+        statistic[o_.fingers + 1] += square * moment[t];
+        statistic[o_.fingers + 2] += square * square;
+        if (rows != o_.fingers - 1) continue;
+        if (t > 0 && contrasts_.FirstRow(t) - contrasts_.FirstRow(t - 1) == rows)
+          statistic[o_.fingers + 3] += own.dot(r.segment(contrasts_.FirstRow(t - 1), rows));
+        const int pose = o_.pose[contrasts_.touches()[t]];
+        if (repeats[pose]++ == 0) mean[pose] = Eigen::VectorXd::Zero(rows);
+        mean[pose] += own;
+      }
+      for (int i = 0; i < o_.fingers; ++i) statistic[i] = std::log(std::max(statistic[i], 1e-300));
+      statistic[o_.fingers + 2] = std::log(std::max(statistic[o_.fingers + 2], 1e-300));
+      for (int pose = 0; pose < o_.poses; ++pose)
+        if (repeats[pose] > 1) statistic[o_.fingers + 4] += mean[pose].squaredNorm() / repeats[pose];
+    }
+    return statistics;
+  }
+
+  static void Centre(std::vector<double>* values) {
+    const double mean =
+        std::accumulate(values->begin(), values->end(), 0.0) / static_cast<double>(values->size());
+    for (double& value : *values) value -= mean;
+  }
+
+  const Workspace& workspace_;
+  const engine::StepwiseSearch& search_;
+  const touches::Observations& o_;
+  const touches::Contrasts& contrasts_;
+  const int initial_effects_;
+  engine::Fit fit_;  // the model as it was given
+  touches::Prediction details_;
+  engine::LinearHypotheses hypotheses_;
+};
+
+}  // namespace
+
+absl::StatusOr<engine::NothingMissing> TestNothingMissing(const Workspace& workspace,
+                                                          const engine::StepwiseSearch& search) {
+  return Tester(workspace, search).Run();
+}
+
+}  // namespace touchstone::diagnosis::selection
