@@ -133,6 +133,9 @@ TEST(HonestReport, SaysHowLikelyDataOfTheGivenModelLookAsBad) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   EXPECT_LT(*Diagnosed(touches::MakeTestInput(rig)).p_nothing_missing, 1e-6);
+  DiagnosisInput noiseless = touches::MakeTestInput({});
+  noiseless.model = std::make_shared<const model::Model>(model::NominalModel());
+  EXPECT_EQ(Diagnosed(noiseless).p_nothing_missing, 0);
   // The size of the noise alone is no sign that something is missing.
   DiagnosisInput quiet = touches::MakeTestInput({});
   quiet.model = std::make_shared<const model::Model>(

@@ -56,6 +56,11 @@ class Tester {
     // What is left is less than numbers are rounded to: it has no noise, and its pattern is that of rounding.
     const double rms_s = std::sqrt(fit_.columns.values.col(0).squaredNorm() / std::max(contrasts_.rows(), 1));
     if (rms_s < RoundingS(o_)) return engine::NothingMissing{1, hypotheses_.size()};
+    // Data of a model without any noise agree to rounding: these do not.
+    const auto& given = workspace_.input.model->effects;
+    if (std::none_of(given.begin(), given.end(),
+                     [](const model::EffectInstance& instance) { return instance.effect->random(); }))
+      return engine::NothingMissing{0, hypotheses_.size()};
     const Eigen::MatrixXd linear = hypotheses_.PValues(residuals);
     const Eigen::MatrixXd others = engine::PValuesOfStatistics(Statistics(residuals));
     Eigen::MatrixXd p_values(linear.rows() + others.rows(), residuals.cols());

@@ -52,6 +52,7 @@ TEST(HiddenEffects, OfSetsWithoutPosesBlameNobody) {
 TEST(HiddenEffects, AreNotMadeUpFromLossesAndOutliers) {
   ExpectAlways("20 % missing", 1, "false claim", false);
   ExpectAlways("2 % outliers", 1, "false claim", false);
+  ExpectAlways("2 % outliers", 1, "owns up to gross errors", true);
 }
 
 TEST(TheModelsOwnValues, AreCorrectedWhereTheyAreWrong) {
