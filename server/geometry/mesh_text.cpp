@@ -1,7 +1,9 @@
 // Text and messages that the readers of the mesh formats share.
 #include <absl/strings/charconv.h>
 #include <absl/strings/escaping.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 
 #include <charconv>
 #include <cmath>
@@ -21,6 +23,8 @@ bool IsBlank(char c) {
 bool LineReader::Next() {
   if (rest_.empty()) return false;
   ++number_;
+  // Files put together from several have a byte-order mark where each began.
+  absl::ConsumePrefix(&rest_, "\xEF\xBB\xBF");
   size_t end = 0;
   while (end < rest_.size() && rest_[end] != '\n' && rest_[end] != '\r') ++end;
   line_ = rest_.substr(0, end);
@@ -63,6 +67,15 @@ bool ParseReal(absl::string_view word, double* value) {
     return again.ptr == end && std::abs(*value) <= 1.0;
   }
   return result.ec == std::errc() && result.ptr == end && std::isfinite(*value);
+}
+
+bool IsReal(absl::string_view word) {
+  double ignored;
+  if (ParseReal(word, &ignored)) return true;
+  // As C libraries print what is not finite: nan, -nan(ind), inf; 1.#QNAN, -1.#IND, 1.#INF.
+  if (!word.empty() && (word[0] == '-' || word[0] == '+')) word.remove_prefix(1);
+  return absl::StartsWithIgnoreCase(word, "nan") || absl::StartsWithIgnoreCase(word, "inf") ||
+         absl::StartsWith(word, "1.#");
 }
 
 bool ParseWhole(absl::string_view word, int64_t* value) {
