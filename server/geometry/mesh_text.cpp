@@ -3,12 +3,12 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/strip.h>
 
 #include <charconv>
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {
@@ -21,19 +21,8 @@ bool IsBlank(char c) {
 }  // namespace
 
 bool LineReader::Next() {
-  if (rest_.empty()) return false;
+  if (!NextLine(&rest_, &line_)) return false;
   ++number_;
-  // Files put together from several have a byte-order mark where each began.
-  absl::ConsumePrefix(&rest_, "\xEF\xBB\xBF");
-  size_t end = 0;
-  while (end < rest_.size() && rest_[end] != '\n' && rest_[end] != '\r') ++end;
-  line_ = rest_.substr(0, end);
-  if (end == rest_.size()) {
-    rest_ = {};
-    return true;
-  }
-  const bool two = rest_[end] == '\r' && end + 1 < rest_.size() && rest_[end + 1] == '\n';
-  rest_.remove_prefix(end + (two ? 2 : 1));
   return true;
 }
 
