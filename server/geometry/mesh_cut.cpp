@@ -25,7 +25,8 @@ absl::Status MeshReading::CheckLastFace() const {
   const auto vertices = static_cast<int64_t>(mesh_.points.size());
   // A colour, a normal or a weight behind the face takes nothing from its shape. OBJ counts from 1, or back from the end.
   const int64_t last = mesh_.corners.back();
-  if (!number || (*number != last && *number != last + 1 && *number + vertices != last)) return absl::OkStatus();
+  if (!number || (*number != last && *number != last + 1 && *number + vertices != last))
+    return absl::OkStatus();
 
   const size_t size = mesh_.sizes.back();
   const bool may_lack_digits = 10 * std::abs(*number) <= vertices && *number != 0;

@@ -193,9 +193,10 @@ absl::StatusOr<std::string> MeshFormatOf(const std::string& path, absl::string_v
   absl::ConsumePrefix(&bytes, kByteOrderMark);
   for (const Format& format : kFormats)
     if (format.looks_like(bytes)) return std::string(format.name);
-  return absl::InvalidArgumentError(absl::StrCat(
-      path, ": the extension '", extension, "' names no mesh format",
-      bytes.empty() ? "" : ", and the file begins like none", "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": the extension '", extension,
+                                                 "' names no mesh format",
+                                                 bytes.empty() ? "" : ", and the file begins like none",
+                                                 "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
 }
 
 absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string_view format,
@@ -222,8 +223,9 @@ absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string
     // What another program called wrongly is told from what is damaged.
     for (const Format& other : kFormats)
       if (&other != reader && !reader->looks_like(bytes) && other.looks_like(bytes))
-        return absl::InvalidArgumentError(absl::StrCat(read.message(), "; the file begins like one of format ",
-                                                       other.name, ": .", other.name, " would be its extension"));
+        return absl::InvalidArgumentError(absl::StrCat(read.message(),
+                                                       "; the file begins like one of format ", other.name,
+                                                       ": .", other.name, " would be its extension"));
     return read;
   }
   TOUCHSTONE_RETURN_IF_ERROR(reading.CheckLastFace());

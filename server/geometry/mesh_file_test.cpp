@@ -139,9 +139,12 @@ TEST_F(MeshFile, TheExtensionNamesTheFormatInAnyCase) {
 }
 
 TEST_F(MeshFile, WithoutAnExtensionBeginsAsItsFormatDoes) {
-  const std::string obj = "# a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ply =
-      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  const std::string
+      obj = "# a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+      ply =
+          "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 "
+          "2\n";
   const std::string stl =
       "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
       "endsolid\n";
@@ -169,8 +172,9 @@ TEST(MeshImport, Utf16IsRead) {
   const auto mesh = ReadMeshBytes("t.off", "off", bytes);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_EQ(mesh->triangles, ReadMeshBytes("t.off", "off", kBox)->triangles);
-  EXPECT_THAT(std::string(ReadMeshBytes("t.off", "off", bytes.substr(0, bytes.size() - 1)).status().message()),
-              HasSubstr("ends within a character"));
+  EXPECT_THAT(
+      std::string(ReadMeshBytes("t.off", "off", bytes.substr(0, bytes.size() - 1)).status().message()),
+      HasSubstr("ends within a character"));
 }
 
 // A tetrahedron whose vertices have the numbers 40 to 43 of 44, with the last corner written as `last`.
@@ -179,9 +183,11 @@ std::string TetrahedronEndingWith(const std::string& last, int first_index) {
   const char* const v = first_index == 1 ? "v " : "";
   for (int k = 0; k < 40; ++k) absl::StrAppend(&text, v, k, " 7 7\n");
   for (const char* corner : {"0 0 0", "50 0 0", "0 50 0", "0 0 50"}) absl::StrAppend(&text, v, corner, "\n");
-  const auto face = [&](int a, int b) { return absl::StrCat(first_index == 1 ? "f " : "3 ", a + first_index, " ", b + first_index, " "); };
-  absl::StrAppend(&text, face(40, 42), 41 + first_index, "\n", face(40, 41), 43 + first_index, "\n", face(40, 43),
-                  42 + first_index, "\n", face(41, 42), last);
+  const auto face = [&](int a, int b) {
+    return absl::StrCat(first_index == 1 ? "f " : "3 ", a + first_index, " ", b + first_index, " ");
+  };
+  absl::StrAppend(&text, face(40, 42), 41 + first_index, "\n", face(40, 41), 43 + first_index, "\n",
+                  face(40, 43), 42 + first_index, "\n", face(41, 42), last);
   return text;
 }
 

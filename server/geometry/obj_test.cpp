@@ -38,11 +38,12 @@ const std::string kFourFaces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
 
 TEST(Obj, CommentsAndNamesMayEndInABackslash) {
   for (const std::string& text :
-       {"# exported to C:\\parts\\\n" + kFourVertices + kFourFaces,
-        "o part\\\n" + kFourVertices + kFourFaces, "mtllib C:\\m\\\r\n" + kFourVertices + kFourFaces,
-        kFourVertices + "# C:\\x\\\n" + kFourFaces, kFourVertices + "g a\\\n# c\n" + kFourFaces,
-        kFourVertices + "usemtl steel\\\n" + kFourFaces, kFourVertices + "vn 0 0 1\\\n" + kFourFaces,
-        kFourVertices + "f 1 3 2 # C:\\\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", kFourVertices + kFourFaces + "g end\\"}) {
+       {"# exported to C:\\parts\\\n" + kFourVertices + kFourFaces, "o part\\\n" + kFourVertices + kFourFaces,
+        "mtllib C:\\m\\\r\n" + kFourVertices + kFourFaces, kFourVertices + "# C:\\x\\\n" + kFourFaces,
+        kFourVertices + "g a\\\n# c\n" + kFourFaces, kFourVertices + "usemtl steel\\\n" + kFourFaces,
+        kFourVertices + "vn 0 0 1\\\n" + kFourFaces,
+        kFourVertices + "f 1 3 2 # C:\\\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+        kFourVertices + kFourFaces + "g end\\"}) {
     const absl::StatusOr<TriangleMesh> mesh = ReadObj(text);
     ASSERT_TRUE(mesh.ok()) << text << mesh.status();
     EXPECT_EQ(mesh->vertices_m.size(), 4u) << text;

@@ -99,7 +99,8 @@ class BodyReader {
   absl::Status ReadList(const Property& property, uint64_t row, bool is_corners) {
     double length;
     TOUCHSTONE_RETURN_IF_ERROR(rows_.Number(property.count_type, property, &length));
-    if (!(length >= 0) || length > static_cast<double>(rows_.bytes_left_in_row() / rows_.MinBytes(property.type)))
+    if (!(length >= 0) ||
+        length > static_cast<double>(rows_.bytes_left_in_row() / rows_.MinBytes(property.type)))
       return rows_.Error(absl::StrCat("row ", row, " has a list ", Quoted(property.name), " of ", length,
                                       " entries, which do not stand there"));
     if (is_corners) corners_.clear();

@@ -40,7 +40,8 @@ TEST(Ply, MarksWhereFilesWerePutTogetherArePassedOver) {
 
 TEST(Ply, ColoursMayBeNotANumberButPlacesMayNot) {
   const std::string elements =
-      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float red\nproperty uchar "
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float red\nproperty "
+      "uchar "
       "green\n" +
       kFace;
   EXPECT_TRUE(Read(Text(elements, "0 0 0 nan 1\n50 0 0 -nan nan\n0 50 0 inf 3\n3 0 1 2\n")).ok())
