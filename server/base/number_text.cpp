@@ -14,15 +14,15 @@
 namespace touchstone {
 namespace {
 
-constexpr absl::string_view kMinusSigns[] = {"\xE2\x88\x92", "\xE2\x80\x93"};        // minus, en dash
+constexpr absl::string_view kMinusSigns[] = {"\xE2\x88\x92", "\xE2\x80\x93"};  // minus, en dash
 constexpr absl::string_view kNoBreakSpaces[] = {"\xC2\xA0", "\xE2\x80\xAF", "\xE2\x80\x89"};
 constexpr size_t kMaxShown = 48;
 
 // The first letters of the months' names in English, German, French, Spanish and Italian, in lower case.
-constexpr absl::string_view kMonths[] = {"jan", "f\u00E9v", "feb", "fev", "mar", "m\u00E4r", "mrz", "apr", "avr", "abr",
-                                         "may", "mai", "mag", "jun", "jui", "giu", "jul", "lug", "aug", "aou", "ao\u00FB",
-                                         "ago", "sep", "set", "oct", "okt", "ott", "nov", "dec", "d\u00E9c", "dez", "dic",
-                                         "ene", "gen"};
+constexpr absl::string_view kMonths[] = {
+    "jan", "f\u00E9v", "feb", "fev", "mar", "m\u00E4r", "mrz", "apr", "avr",      "abr", "may", "mai",
+    "mag", "jun",      "jui", "giu", "jul", "lug",      "aug", "aou", "ao\u00FB", "ago", "sep", "set",
+    "oct", "okt",      "ott", "nov", "dec", "d\u00E9c", "dez", "dic", "ene",      "gen"};
 
 bool NamesAMonth(absl::string_view text) {
   const std::string lower = absl::AsciiStrToLower(text);
@@ -82,9 +82,10 @@ std::string WhyNoNumber(absl::string_view text) {
   const std::string shown = absl::StrCat("'", absl::Utf8SafeCHexEscape(text.substr(0, kMaxShown)),
                                          text.size() > kMaxShown ? "...'" : "'");
   if (text.size() <= kMaxShown && (NamesAMonth(text) || IsDateOrTimeOfDigits(text)))
-    return absl::StrCat(shown,
-                        " is a date or a time, into which spreadsheets turn numbers like 22.5; the number was expected: "
-                        "format the cells as numbers before it is entered, and write the file again");
+    return absl::StrCat(
+        shown,
+        " is a date or a time, into which spreadsheets turn numbers like 22.5; the number was expected: "
+        "format the cells as numbers before it is entered, and write the file again");
   const size_t comma = text.find(',');
   std::string with_point = WithPlainSigns(text);
   std::replace(with_point.begin(), with_point.end(), ',', '.');

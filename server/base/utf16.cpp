@@ -50,7 +50,8 @@ absl::StatusOr<std::string> Utf8FromUtf16(absl::string_view bytes) {
         absl::StrCat("line ", line, ": ", what, "; whole characters of UTF-16 were expected (or UTF-8)"));
   };
   const auto unit = [&](size_t at) -> uint32_t {
-    const auto first = static_cast<unsigned char>(bytes[at]), second = static_cast<unsigned char>(bytes[at + 1]);
+    const auto first = static_cast<unsigned char>(bytes[at]),
+               second = static_cast<unsigned char>(bytes[at + 1]);
     return big_endian ? first << 8 | second : second << 8 | first;
   };
   for (size_t at = 0; at + 1 < bytes.size(); at += 2) {

@@ -40,7 +40,8 @@ TEST(Utf16, ThatIsCutIsRefusedWithItsLine) {
     return std::string(Utf8FromUtf16(bytes).status().message());
   };
   const std::string bytes = Utf16(u"a\nbc", false, true);
-  EXPECT_THAT(message(bytes.substr(0, bytes.size() - 1)), HasSubstr("line 2: the file ends within a character"));
+  EXPECT_THAT(message(bytes.substr(0, bytes.size() - 1)),
+              HasSubstr("line 2: the file ends within a character"));
   EXPECT_THAT(message(Utf16(u"a\xD83D", false, true)), HasSubstr("line 1: the first half"));
   EXPECT_THAT(message(Utf16(u"a\xDE00z", true, true)), HasSubstr("line 1: the second half"));
 }

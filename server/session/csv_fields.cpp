@@ -53,8 +53,9 @@ absl::StatusOr<std::vector<std::string>> ReadCsvHeader(const std::string& origin
   };
   absl::string_view header;
   const bool any = lines->Next(&header);
-  if (!any) return absl::InvalidArgumentError(absl::StrCat(origin, ":1: a header line was expected (", example, ")"));
-  if ( absl::StripAsciiWhitespace(header).empty())
+  if (!any)
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":1: a header line was expected (", example, ")"));
+  if (absl::StripAsciiWhitespace(header).empty())
     return wrong(absl::StrCat("a header line was expected (", example, ")"));
   if (absl::Status status = fields->Cut(header); !status.ok()) return wrong(status.message());
   const size_t columns = fields->all().size();
@@ -119,7 +120,8 @@ absl::Status CsvFields::Cut(absl::string_view line) {
     if (fields_.size() >= kMaxFields)
       return absl::InvalidArgumentError(absl::StrCat("has more than ", kMaxFields, " fields"));
     size_t start = begin;
-    while (start < line.size() && line[start] != separator_ && (line[start] == ' ' || line[start] == '\t')) ++start;
+    while (start < line.size() && line[start] != separator_ && (line[start] == ' ' || line[start] == '\t'))
+      ++start;
     if (start < line.size() && line[start] == '"') {
       TOUCHSTONE_ASSIGN_OR_RETURN(const size_t end, CutQuoted(line, start, quoted++));
       if (end == line.size()) break;

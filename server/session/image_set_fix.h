@@ -25,7 +25,7 @@ struct ImageSetFix {
   // changes pictures or poses; names, rows and the camera belong to the whole set.
   std::vector<std::pair<uint64_t, uint64_t>> images;
   bool plain_text = false;  // images.csv as UTF-8 with commas, decimal points, '-' for minus (plain_csv.h)
-  int shift_rows = 0;       // the picture of row k belongs to row k + shift_rows; rows that get none are dropped
+  int shift_rows = 0;  // the picture of row k belongs to row k + shift_rows; rows that get none are dropped
   int rotate_deg = 0;  // pictures are turned clockwise by 90, 180 or 270
   Mirror mirror = Mirror::kNone;
   bool swap_channels = false;  // red and blue

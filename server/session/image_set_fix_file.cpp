@@ -86,7 +86,8 @@ absl::StatusOr<FixedImageSet> FixImageSet(const ImageSet& set, absl::string_view
   FixedImageSet fixed;
   fixed.set = set;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> left, ApplyFix(fix, &fixed.set));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PlainCsv> plain, ConvertToPlainCsv(images_csv, set.origin, fix.plain_text));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PlainCsv> plain,
+                              ConvertToPlainCsv(images_csv, set.origin, fix.plain_text));
   if (plain) images_csv = plain->text;
   const int first_line = plain ? plain->skipped_lines + 1 : 1;
   const std::vector<absl::string_view> lines = LinesWithEnds(images_csv);
@@ -97,7 +98,8 @@ absl::StatusOr<FixedImageSet> FixImageSet(const ImageSet& set, absl::string_view
   TOUCHSTONE_RETURN_IF_ERROR(columns.Cut(header));
   for (size_t row = 0; row < left.size(); ++row) {
     const PhotographRow &was = set.photographs[left[row]], &is = fixed.set.photographs[row];
-    std::vector<std::string> fields = RawFields(absl::StripTrailingAsciiWhitespace(lines[was.line - first_line]));
+    std::vector<std::string> fields =
+        RawFields(absl::StripTrailingAsciiWhitespace(lines[was.line - first_line]));
     for (size_t i = 0; i < std::min(fields.size(), columns.all().size()); ++i)
       FixField(std::string(absl::StripAsciiWhitespace(columns.all()[i])), set, was, fixed.set, is,
                &fields[i]);

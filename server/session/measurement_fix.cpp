@@ -212,9 +212,9 @@ absl::StatusOr<std::vector<int>> ApplyToTouches(const MeasurementFix& fix, Measu
 }  // namespace
 
 bool MeasurementFix::empty() const {
-  return !plain_text && !drop_duplicates && shift_rows == 0 && finger_order.empty() && rename_objects.empty() &&
-         scale_times == 1 && scale_targets == 1 && scale_standoff == 1 && scale_speed == 1 && !axes &&
-         !reverse_approach && !reverse_lateral && move_objects_m.empty();
+  return !plain_text && !drop_duplicates && shift_rows == 0 && finger_order.empty() &&
+         rename_objects.empty() && scale_times == 1 && scale_targets == 1 && scale_standoff == 1 &&
+         scale_speed == 1 && !axes && !reverse_approach && !reverse_lateral && move_objects_m.empty();
 }
 
 absl::StatusOr<std::vector<int>> ApplyFix(const MeasurementFix& fix, MeasurementSet* set) {

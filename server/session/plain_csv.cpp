@@ -26,7 +26,8 @@ bool HoldsNames(absl::string_view column) {
 // "sep=;" as the first line tells some spreadsheets.
 std::optional<char> AnnouncedSeparator(absl::string_view line) {
   line = absl::StripAsciiWhitespace(line);
-  if (absl::StartsWith(line, "\"") && absl::EndsWith(line, "\"") && line.size() > 2) line = line.substr(1, line.size() - 2);
+  if (absl::StartsWith(line, "\"") && absl::EndsWith(line, "\"") && line.size() > 2)
+    line = line.substr(1, line.size() - 2);
   if (!absl::StartsWithIgnoreCase(line, "sep=")) return std::nullopt;
   line.remove_prefix(4);
   return line.empty() ? '\t' : line[0];  // a tab is white space, stripped above
@@ -133,19 +134,23 @@ class CsvConversion {
     const CsvPlace& first = comma.line > 0 ? comma : either;
     if (first.line == 0) return absl::OkStatus();
     if (point.line > 0)
-      return Wrong(first, absl::StrCat("has a comma, but '", Shown(point.field), "' (line ", point.line, ", column ",
-                                       point.column, ") a point; numbers with decimal points and without commas were "
-                                                     "expected, or all with decimal commas"));
+      return Wrong(first, absl::StrCat("has a comma, but '", Shown(point.field), "' (line ", point.line,
+                                       ", column ", point.column,
+                                       ") a point; numbers with decimal points and without commas were "
+                                       "expected, or all with decimal commas"));
     if (comma.line == 0)
-      return Wrong(first, "has a comma that may be a decimal one or part thousands, as all commas of the file; numbers "
-                          "with decimal points and without commas were expected");
+      return Wrong(
+          first,
+          "has a comma that may be a decimal one or part thousands, as all commas of the file; numbers "
+          "with decimal points and without commas were expected");
     decimal_commas_ = true;
     return absl::OkStatus();
   }
 
   // A file that ends within a line may have lost a part of its last field: the digits show it where other rows have more.
   absl::Status CheckLastField() const {
-    if (text_.empty() || text_.back() == '\n' || text_.back() == '\r' || columns_.empty()) return absl::OkStatus();
+    if (text_.empty() || text_.back() == '\n' || text_.back() == '\r' || columns_.empty())
+      return absl::OkStatus();
     const bool names = HoldsNames(columns_.back());
     CsvPlace last;
     std::vector<std::string> others;
@@ -157,9 +162,10 @@ class CsvConversion {
     int lines = skipped_lines_;
     while (NextLine(&rest, &line)) ++lines;
     if (others.empty() || last.line != lines || !MayBeCut(last.field, others, names)) return absl::OkStatus();
-    return Wrong(last, absl::StrCat("may be cut off: the file ends within this line, and other rows have values like '",
-                                    Shown(others.back()),
-                                    "'; write the file again, or end the line if the field is whole"));
+    return Wrong(
+        last,
+        absl::StrCat("may be cut off: the file ends within this line, and other rows have values like '",
+                     Shown(others.back()), "'; write the file again, or end the line if the field is whole"));
   }
 
   static bool MayBeCut(const std::string& last, const std::vector<std::string>& others, bool names) {
@@ -176,7 +182,8 @@ class CsvConversion {
     const auto decimals = [&point](const std::string& field) {
       return point(field) == std::string::npos ? size_t{0} : field.size() - point(field) - 1;
     };
-    if (point(last) == last.size() - 1 || absl::StrContains("eE+-", last.back()) || absl::EndsWith(last, "e-0"))
+    if (point(last) == last.size() - 1 || absl::StrContains("eE+-", last.back()) ||
+        absl::EndsWith(last, "e-0"))
       return true;
     if (point(last) != std::string::npos)
       return share([&](const std::string& other) { return decimals(other) > 2 * decimals(last); }) > 0.5;
@@ -205,13 +212,14 @@ class CsvConversion {
   std::string PlainField(absl::string_view field, size_t column, bool thorough) const {
     if (column >= columns_.size() || HoldsNames(columns_[column])) return QuotedField(std::string(field));
     std::string number = thorough ? WithPlainSigns(field) : std::string(field);
-    if (decimal_commas_ && NotationOf(field) >= Notation::kDecimalComma) std::replace(number.begin(), number.end(), ',', '.');
+    if (decimal_commas_ && NotationOf(field) >= Notation::kDecimalComma)
+      std::replace(number.begin(), number.end(), ',', '.');
     return QuotedField(number);
   }
 
   absl::Status Wrong(const CsvPlace& place, absl::string_view what) const {
-    return absl::InvalidArgumentError(
-        absl::StrCat(origin_, ":", place.line, ": column ", place.column, ": '", Shown(place.field), "' ", what));
+    return absl::InvalidArgumentError(absl::StrCat(origin_, ":", place.line, ": column ", place.column, ": '",
+                                                   Shown(place.field), "' ", what));
   }
 
   absl::string_view text_;  // from the header on

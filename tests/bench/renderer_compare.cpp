@@ -34,8 +34,8 @@ absl::StatusOr<Rendered> RenderAll(image::Renderer* renderer,
   std::chrono::steady_clock::time_point start;
   for (int k = -kWarmUp; k < count; ++k) {
     if (k == 0) start = std::chrono::steady_clock::now();
-    auto picture = renderer->Render(
-        surface, image::SpiralView(surface->bounds(), std::max(k, 0), count, 1.0), options);
+    auto picture =
+        renderer->Render(surface, image::SpiralView(surface->bounds(), std::max(k, 0), count, 1.0), options);
     if (!picture.ok()) return picture.status();
     if (k >= 0) rendered.pictures.push_back(*std::move(picture));
   }
