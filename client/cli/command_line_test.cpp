@@ -183,6 +183,49 @@ TEST_F(CommandLineTest, ModelFilesAreNeverChanged) {
   EXPECT_NE(Run(nominal).out, Run(tips).out);
 }
 
+constexpr size_t kOutlinePictures = 40, kOutlineSidePx = 48;
+
+// Of the pictures of a folder, those that show the object everywhere.
+int PicturesWithoutOutline(const std::string& folder) {
+  const std::string npy = *ReadFile(folder + "/shard-000000/mask.npy");
+  constexpr size_t kPixels = kOutlineSidePx * kOutlineSidePx;
+  int without = 0;
+  for (size_t k = 0; k < kOutlinePictures; ++k) {
+    const absl::string_view mask =
+        absl::string_view(npy).substr(npy.size() - (kOutlinePictures - k) * kPixels, kPixels);
+    without += mask.find('\0') == absl::string_view::npos;
+  }
+  return without;
+}
+
+TEST_F(CommandLineTest, PicturesOfADatasetShowTheOutlineOfTheObject) {
+  const auto stream = [&](const std::string& folder, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"stream",     "--samples", "40",   "--image", "48x48", "--mask",
+                                          "--renderer", "cpu",       "--to", "folder",  "--out", folder};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(stream("far", {}), Not(HasSubstr("outline")));
+  EXPECT_EQ(PicturesWithoutOutline(Path("far")), 0);
+  EXPECT_THAT(
+      stream("near", {"--radius-ratio", "1.05", "--objects", "lat20"}),
+      AllOf(HasSubstr("note: the camera of a touch stands where the touch begins, so near to 'lat20'"),
+            HasSubstr("most pictures have no outline. --radius-ratio 2.4 or a larger --fov-deg shows all")));
+  EXPECT_GT(PicturesWithoutOutline(Path("near")), 30);
+  EXPECT_THAT(stream("faces", {"--plan", "faces", "--objects", "lat20"}), HasSubstr("--standoff-mm"));
+}
+
+TEST_F(CommandLineTest, AJobThatGetsNoShardSaysWhy) {
+  const Outcome outcome = Run({"stream", "--samples", "100", "--shards", "3/4", "--out", "d"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(
+      outcome.err,
+      HasSubstr("nothing for job 3 of 4: 100 samples make 1 shard of 10000, which go to the jobs from 0 "
+                "on. A --shard-size of 25, the same in all jobs, gives each one something"));
+}
+
 TEST_F(CommandLineTest, ImagesComeAsFilesInTheShards) {
   const Outcome outcome = Run({"stream", "--samples", "20", "--image", "32x24", "--renderer", "cpu",
                                "--depth", "--mask", "--out", "d"});

@@ -355,12 +355,13 @@ absl::Status Comparison::SendMeshes(const std::vector<source::MeshSpec>& meshes)
     v1::MeshFile::Format format;
     v1::MeshFile::LengthUnit unit;
     v1::MeshFile::Axis up;
-    TOUCHSTONE_CHECK(
-        v1::MeshFile::Format_Parse(named(fs::path(source.path).extension().string().substr(1)), &format));
+    TOUCHSTONE_ASSIGN_OR_RETURN(*file->mutable_data(), ReadFile(source.path));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string format_name,
+                                geometry::MeshFormatOf(source.path, file->data()));
+    TOUCHSTONE_CHECK(v1::MeshFile::Format_Parse(named(format_name), &format));
     TOUCHSTONE_CHECK(v1::MeshFile::LengthUnit_Parse(named(source.unit), &unit));
     TOUCHSTONE_CHECK(v1::MeshFile::Axis_Parse(named(source.up), &up));
     file->set_format(format);
-    TOUCHSTONE_ASSIGN_OR_RETURN(*file->mutable_data(), ReadFile(source.path));
     file->set_unit(unit);
     file->set_up(up);
     file->set_scale(source.scale);

@@ -10,6 +10,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/plausible_size.h"
 #include "server/geometry/supershape.h"
+#include "server/geometry/winding.h"
 #include "server/model/model.h"
 #include "server/touch/touch_notes.h"
 
@@ -36,6 +37,7 @@ Json ReportJson(const geometry::TriangleMesh& mesh, const geometry::MeshReport& 
           {"degenerate_triangles", report.degenerate_triangles},
           {"duplicate_triangles", report.duplicate_triangles},
           {"unused_vertices", report.unused_vertices},
+          {"wrongly_wound_triangles", geometry::WronglyWound(mesh).size()},
           {"mesh_hash", geometry::MeshHash(mesh)}};
 }
 
@@ -65,10 +67,17 @@ std::string ReportInWords(const std::string& name, const geometry::TriangleMesh&
                   " mm, centre at ", mm(centre_m.x()), ", ", mm(centre_m.y()), ", ", mm(centre_m.z()),
                   " mm\n");
   absl::StrAppend(&text, "  Hash      ", geometry::MeshHash(mesh), "\n");
+  const size_t wrong = geometry::WronglyWound(mesh).size();
+  double volume_m3 = std::abs(report.signed_volume_m3);
+  if (wrong > 0 && wrong < mesh.triangles.size()) {
+    geometry::TriangleMesh outward = mesh;
+    geometry::Turn(geometry::WronglyWound(mesh), &outward);
+    volume_m3 = geometry::InspectMesh(outward).signed_volume_m3;
+  }
   if (report.closed()) {
     constexpr double kCubicCentimetresPerCubicMetre = 1e6;
-    absl::StrAppend(&text, "  Surface   closed, volume ",
-                    Rounded(std::abs(report.signed_volume_m3) * kCubicCentimetresPerCubicMetre), " cm3\n");
+    absl::StrAppend(&text, "  Surface   closed, volume ", Rounded(volume_m3 * kCubicCentimetresPerCubicMetre),
+                    " cm3\n");
   } else {
     absl::StrAppend(&text, "  Surface   not closed: ");
     if (report.boundary_edges > 0)
@@ -79,10 +88,17 @@ std::string ReportInWords(const std::string& name, const geometry::TriangleMesh&
                       Counted(report.nonmanifold_edges, "edge", "edges"), " with three triangles or more");
     text += "\n";
   }
-  // Only a closed, consistent surface has an inside.
-  if (report.closed() && report.inconsistent_edges == 0 && report.signed_volume_m3 < 0)
+  if (wrong == mesh.triangles.size())
     text +=
-        "  Note      it is inside out: its triangles run clockwise seen from outside. Touches do not mind\n";
+        "  Note      it is inside out: its triangles run clockwise seen from outside. Touches do not mind. "
+        "touchstone mesh "
+        "import --outward turns them\n";
+  else if (wrong > 0)
+    absl::StrAppend(&text, "  Note      ", wrong, " of ", mesh.triangles.size(),
+                    " triangles are wound the wrong way round: a "
+                    "part of it is inside out; the volume counts them as they should be. touchstone mesh "
+                    "import --outward "
+                    "turns them\n");
   if (report.inconsistent_edges > 0)
     absl::StrAppend(&text, "  Note      ", Counted(report.inconsistent_edges, "edge is", "edges are"),
                     " run through twice in the same direction: neighbouring triangles face opposite ways\n");
@@ -158,6 +174,11 @@ void Center(const Cli& cli, geometry::TriangleMesh* mesh) {
 
 absl::Status RunImport(const Cli& cli, const MeshOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(geometry::TriangleMesh mesh, ReadMesh(cli, options));
+  if (options.outward) {
+    const std::vector<uint32_t> wrong = geometry::WronglyWound(mesh);
+    geometry::Turn(wrong, &mesh);
+    cli.Log(absl::StrCat("turned ", Counted(wrong.size(), "triangle", "triangles"), " outward"));
+  }
   if (options.center) Center(cli, &mesh);
   return WriteMesh(cli, options, mesh);
 }
@@ -243,6 +264,8 @@ void AddMesh(Cli* cli) {
                 import->add_option("FILE", options->input, "The mesh to read")->type_name("")->required());
   add_output(import);
   AddImportOptions(import, options.get());
+  import->add_flag("--outward", options->outward,
+                   "Turn the triangles of closed parts that run clockwise seen from outside");
   import->add_flag(
       "--center", options->center,
       "Move the mesh so that the centre of its bounding box is the origin, about which object_scale and "

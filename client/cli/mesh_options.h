@@ -16,7 +16,8 @@ struct MeshOptions {
   std::string up = "z";
   double scale = 1;
   double fit_mm = 0;
-  bool center = false;  // import: the centre of the bounding box becomes the origin
+  bool center = false;
+  bool outward = false;  // import: the centre of the bounding box becomes the origin
   // Supershapes.
   std::string name;
   uint64_t triangles = 20000;

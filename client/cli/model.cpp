@@ -1,9 +1,12 @@
 // touchstone model new|show|add|remove|diff: model files. A file is never changed; every change is a new one.
+#include <absl/strings/str_join.h>
+
 #include <filesystem>
 
 #include "client/cli/common.h"
 #include "client/cli/model_output.h"
 #include "client/source/lab_units.h"
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
@@ -92,7 +95,21 @@ absl::Status SaveChanged(const Cli& cli, const model::Model& before, model::Mode
   return absl::OkStatus();
 }
 
+// An effect whose parameters are all left out acts on nothing.
+absl::Status CheckAnyValue(const ModelOptions& options) {
+  if (!options.assignments.empty()) return absl::OkStatus();
+  const std::shared_ptr<const model::Effect> effect = effects::Catalogue().Find(options.effect);
+  if (effect == nullptr || effect->parameters.empty()) return absl::OkStatus();
+  std::vector<std::string> examples;
+  for (const model::ParameterInfo& parameter : effect->parameters)
+    examples.push_back(absl::StrCat(parameter.name, "=", FileNumber(parameter.unit, parameter.typical)));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "'", options.effect, "' without a value changes nothing; its size was expected, for instance ",
+      absl::StrJoin(examples, " ")));
+}
+
 absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckAnyValue(options));
   TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model before, LoadModel(cli, options.model));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       model::Model after, model::AddEffect(before, options.effect, options.assignments, effects::Catalogue(),

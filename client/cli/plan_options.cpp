@@ -26,6 +26,9 @@ constexpr uint64_t kMaxPlanBytes = 1 << 30;
 // The generators' defaults (source.proto), in the units of files.
 constexpr double kStepAngleDeg = 1;
 constexpr double kRadiusRatio = 1.05;
+constexpr double kRadiusRatioOfPictures = 2.4;  // that client/training uses: at 45 deg the whole object shows
+// Half the height that a picture shows at the target, over half the box's diagonal: below it the object mostly fills the frame.
+constexpr double kMinShownShare = 0.75;
 constexpr uint32_t kSamplesPerFace = 8;
 constexpr uint32_t kRounds = 4;
 constexpr double kMaxTiltDeg = 20;
@@ -56,7 +59,8 @@ void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options) {
   add("--roll-step-deg", options->roll_step_deg, "DEG",
       "sphere: the fingers' row is turned by random multiples of it. Default: 0, not turned");
   add("--radius-ratio", options->radius_ratio, "RATIO",
-      "sphere: radius of the start sphere over half the box's diagonal. Default: 1.05");
+      "sphere: radius of the start sphere over half the box's diagonal. Default: 1.05; of a "
+      "stream with pictures 2.4, from where the whole object shows");
   add("--samples-per-face", options->samples_per_face, "N", "faces: poses per face. Default: 8");
   add("--rounds", options->rounds, "N", "faces: repeats of all poses. Default: 4");
   add("--max-tilt-deg", options->max_tilt_deg, "DEG",
@@ -119,7 +123,7 @@ absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& o, std::vector<std::string>
     v1::SpherePlan* sphere = plan.mutable_sphere();
     sphere->set_step_angle_rad(ToSi(Unit::kDegree, o.step_angle_deg.value_or(kStepAngleDeg)));
     sphere->set_roll_step_rad(ToSi(Unit::kDegree, o.roll_step_deg.value_or(0)));
-    sphere->set_radius_ratio(o.radius_ratio.value_or(kRadiusRatio));
+    sphere->set_radius_ratio(o.radius_ratio.value_or(o.pictures ? kRadiusRatioOfPictures : kRadiusRatio));
     sphere->set_max_incidence_rad(ToSi(Unit::kDegree, o.max_incidence_deg.value_or(kSphereMaxIncidenceDeg)));
     return plan;
   }
@@ -178,6 +182,35 @@ absl::StatusOr<std::optional<std::vector<PlannedPicture>>> ReadPictures(const st
 absl::StatusOr<std::vector<client::MeasuredTouch>> ReadTouches(const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxPlanBytes));
   return client::ParseMeasurements(text, path);
+}
+
+std::string CloseCameraNote(const v1::Plan& plan, const v1::Object& object, double vertical_fov_rad) {
+  const auto corner = [](const v1::Vector3& v) { return Eigen::Vector3d(v.x(), v.y(), v.z()); };
+  const double half_m = 0.5 * (corner(object.bounds_max_m()) - corner(object.bounds_min_m())).norm();
+  double distance_m = plan.has_sphere() ? plan.sphere().radius_ratio() * half_m : plan.faces().standoff_m();
+  if (plan.has_list()) {
+    std::vector<double> standoffs_m;
+    for (const v1::CommandedTouch& touch : plan.list().touches()) standoffs_m.push_back(touch.standoff_m());
+    if (standoffs_m.empty()) return "";
+    const auto middle = standoffs_m.begin() + static_cast<std::ptrdiff_t>(standoffs_m.size() / 2);
+    std::nth_element(standoffs_m.begin(), middle, standoffs_m.end());
+    distance_m = *middle;
+  }
+  const double shown_m = distance_m * std::tan(vertical_fov_rad / 2);
+  if (half_m <= 0 || shown_m >= kMinShownShare * half_m) return "";
+  const auto mm = [](double metres) {
+    return absl::StrCat(std::lround(FromSi(Unit::kMillimetre, metres)), " mm");
+  };
+  return absl::StrCat(
+      "the camera of a touch stands where the touch begins, so near to '", object.name(),
+      "' that a picture shows ", mm(2 * shown_m), " of an object of ", mm(2 * half_m),
+      ": most pictures have no outline. ",
+      plan.has_sphere() ? absl::StrCat("--radius-ratio ", ShortestNumber(kRadiusRatioOfPictures))
+      : plan.has_faces()
+          ? absl::StrCat("--standoff-mm ",
+                         std::lround(FromSi(Unit::kMillimetre, half_m * kRadiusRatioOfPictures)))
+          : "Longer standoffs in the file",
+      " or a larger --fov-deg shows all of it");
 }
 
 void AddImageOptions(CLI::App* command, ImageFlags* options) {

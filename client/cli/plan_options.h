@@ -18,12 +18,18 @@ struct PlanOptions {
   std::optional<double> max_tilt_deg, spread, standoff_mm, stroke_beyond_target_mm;
   std::optional<double> max_incidence_deg;
   std::optional<double> speed_mm_s, touch_interval_s;
+  // Each touch is photographed from where it begins: by default so far away that the object's outline shows.
+  bool pictures = false;
 };
 void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options);
 
 // The plan with every default written out, so that a specification means the same for ever. A list's objects,
 // in the order of their first row, go to `objects` (may be null).
 absl::StatusOr<v1::Plan> MakePlan(const PlanOptions& options, std::vector<std::string>* objects);
+
+// Why most pictures that are taken from where touches of that plan begin show no outline of an object with this box, and
+// what would be right; empty: they do.
+std::string CloseCameraNote(const v1::Plan& plan, const v1::Object& object, double vertical_fov_rad);
 
 // --image, --format, ...
 struct ImageFlags {

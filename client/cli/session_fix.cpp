@@ -24,7 +24,8 @@ struct FixOptions {
   std::vector<std::string> rename_objects, move_objects;
   double scale_times = 1, scale_lengths = 1, scale_targets = 1, scale_standoff = 1, scale_speed = 1;
   int shift_rows = 0;
-  bool reverse_lateral = false, reverse_approach = false, drop_duplicates = false, drop_stale = false;
+  bool reverse_lateral = false, reverse_approach = false, drop_duplicates = false, drop_stale = false,
+       plain = false;
   ImageSetFixOptions images;
 };
 
@@ -127,6 +128,7 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
   TOUCHSTONE_RETURN_IF_ERROR(CheckFactors(options));
   TOUCHSTONE_RETURN_IF_ERROR(ReadFingers(options, fingers, &fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &fix));
+  fix.plain_text = options.plain;
   fix.drop_duplicates = options.drop_duplicates;
   fix.drop_stale = options.drop_stale;
   fix.shift_rows = options.shift_rows;
@@ -146,9 +148,9 @@ absl::StatusOr<session::MeasurementFix> ReadFix(const FixOptions& options, int f
 // What a folder of photographs and a measurement file both may need, for a folder.
 absl::Status RunFolderFix(const Cli& cli, const CLI::App& command, const FixOptions& options) {
   // In the order of the help.
-  for (const char* option : {"--touches", "--drop-duplicates", "--drop-stale", "--swap-fingers", "--finger-order",
-                             "--scale-times", "--scale-targets", "--scale-standoff", "--scale-speed",
-                             "--reverse-approach", "--reverse-lateral", "--move-object"})
+  for (const char* option : {"--touches", "--drop-duplicates", "--drop-stale", "--swap-fingers",
+                             "--finger-order", "--scale-times", "--scale-targets", "--scale-standoff",
+                             "--scale-speed", "--reverse-approach", "--reverse-lateral", "--move-object"})
     if (command.count(option) > 0)
       return absl::InvalidArgumentError(absl::StrCat(option, ": is for measurement files, and ", options.file,
                                                      " is a folder of photographs"));
@@ -156,6 +158,7 @@ absl::Status RunFolderFix(const Cli& cli, const CLI::App& command, const FixOpti
   TOUCHSTONE_RETURN_IF_ERROR(ReadObjects(options, &shared));
   session::ImageSetFix fix;
   fix.rename_objects = shared.rename_objects;
+  fix.plain_text = options.plain;
   fix.shift_rows = options.shift_rows;
   fix.scale_lengths = options.scale_lengths;
   TOUCHSTONE_RETURN_IF_ERROR(ReadAxes(options, &fix.axes));
@@ -202,6 +205,7 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
       "touchstone session fix set.csv --swap-fingers l,m -o fixed.csv\n"
       "touchstone session fix set.csv --touches 480-959 --swap-fingers l,m -o fixed.csv\n"
       "touchstone session fix set.csv --reverse-lateral -o fixed.csv\n"
+      "touchstone session fix from_excel.csv --plain -o set.csv\n"
       "touchstone session fix set.csv --swap-objects lat10,lat15 -o fixed.csv\n"
       "touchstone session fix set.csv --scale-times 1000 -o fixed.csv\n"
       "touchstone session fix set.csv --permute-axes=-y,x,z -o fixed.csv\n"
@@ -218,6 +222,9 @@ void AddSessionFix(Cli* cli, CLI::App* group) {
       ->add_option("--touches", options->touches,
                    "Fix these touches alone, by their numbers. Default: all of the file")
       ->type_name("A-B,...");
+  command->add_flag("--plain", options->plain,
+                    "Write the plain form: UTF-8, commas between fields, decimal points, '-' for minus, "
+                    "an end of each line");
   command->add_flag("--drop-duplicates", options->drop_duplicates,
                     "Drop rows whose touch and times repeat an earlier row's to the last digit");
   command->add_flag("--drop-stale", options->drop_stale,

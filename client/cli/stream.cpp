@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <optional>
 
 #include "client/cli/interrupt.h"
 #include "client/cli/motion_options.h"
@@ -27,7 +28,7 @@ struct StreamOptions {
   std::vector<std::string> objects;
   std::vector<std::string> columns;
   std::string model;
-  uint64_t samples = 0;
+  std::optional<uint64_t> samples;
   uint64_t seed = 0;
   uint32_t max_draws = 1000;
   std::string encoding;
@@ -58,8 +59,14 @@ bool Contains(const google::protobuf::RepeatedPtrField<std::string>& names, cons
 absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o, client::ShardFormat format,
                                          client::Connection* connection) {
   v1::DatasetSpec spec;
+  if (o.samples == uint64_t{0})
+    return absl::InvalidArgumentError("--samples: 0 is out of range; 1 or more was expected");
+  std::vector<std::string> columns = SplitCommas(o.columns);
+  const bool any_image_option = !o.image.size.empty() || !o.encoding.empty() || o.image.depth || o.image.mask;
+  PlanOptions plan = o.plan;
+  plan.pictures = any_image_option || std::find(columns.begin(), columns.end(), "image") != columns.end();
   std::vector<std::string> objects_of_file;
-  TOUCHSTONE_ASSIGN_OR_RETURN(*spec.mutable_plan(), MakePlan(o.plan, &objects_of_file));
+  TOUCHSTONE_ASSIGN_OR_RETURN(*spec.mutable_plan(), MakePlan(plan, &objects_of_file));
   std::vector<std::string> objects = SplitCommas(o.objects);
   if (objects.empty() && objects_of_file.size() > 1)
     return absl::InvalidArgumentError(absl::StrCat("--plan: ", o.plan.plan, " names ", objects_of_file.size(),
@@ -74,10 +81,9 @@ absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o,
   TOUCHSTONE_ASSIGN_OR_RETURN(*spec.mutable_model(), ParseModelRef(o.model));
   spec.set_seed(o.seed);
   // A plan that ends gives the number itself.
-  spec.set_samples(o.samples == 0 && spec.plan().has_sphere() ? kDefaultSamples : o.samples);
+  spec.set_samples(o.samples.value_or(spec.plan().has_sphere() ? kDefaultSamples : 0));
   spec.set_max_draws(o.max_draws);
 
-  std::vector<std::string> columns = SplitCommas(o.columns);
   if (columns.empty()) columns = {"index", "object", "pose", "descriptor"};
   for (const std::string& column : columns) {
     TOUCHSTONE_RETURN_IF_ERROR(
@@ -86,7 +92,6 @@ absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o,
             .status());
     if (!Contains(spec.columns(), column)) spec.add_columns(column);
   }
-  const bool any_image_option = !o.image.size.empty() || !o.encoding.empty() || o.image.depth || o.image.mask;
   if (any_image_option && !Contains(spec.columns(), "image")) spec.add_columns("image");
   // A folder's table is a measurement file, which has these.
   if (format == client::ShardFormat::kFolder) {
@@ -104,6 +109,19 @@ absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o,
     TOUCHSTONE_ASSIGN_OR_RETURN(*spec.mutable_image(), MakeImageSpec(cli, o.image, encoding));
   }
   return spec;
+}
+
+// Says which objects fill the frame. A source that does not list its objects is asked again when samples are made.
+absl::Status NoteCloseCameras(const Cli& cli, const v1::DatasetSpec& spec, client::Connection* connection) {
+  if (!Contains(spec.columns(), "image")) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse response,
+                              connection->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
+  for (const v1::Object& object : response.objects()) {
+    if (!Contains(spec.objects(), object.name())) continue;
+    const std::string note = CloseCameraNote(spec.plan(), object, spec.image().vertical_fov_rad());
+    if (!note.empty()) cli.Log("note: " + note);
+  }
+  return absl::OkStatus();
 }
 
 // "3/8": the fourth of eight jobs.
@@ -141,7 +159,15 @@ void Summarise(const Cli& cli, const client::DatasetJob& job, const client::Data
                double elapsed_s) {
   const std::string place = absl::StrCat(job.folder, "/", client::kManifestName);
   const std::string found = Counted(result.shards_found, "shard", "shards");
-  if (result.shards_written == 0)
+  if (result.shards_written + result.shards_found == 0)
+    cli.Log(absl::StrCat(
+        "nothing for job ", job.job_index, " of ", job.job_count, ": ", result.samples_in_dataset,
+        " samples make ",
+        Counted((result.samples_in_dataset + job.shard_size - 1) / job.shard_size, "shard", "shards"), " of ",
+        job.shard_size, ", which go to the jobs from 0 on. A --shard-size of ",
+        std::max<uint64_t>(1, result.samples_in_dataset / job.job_count),
+        ", the same in all jobs, gives each one something"));
+  else if (result.shards_written == 0)
     cli.Log(absl::StrCat("nothing to do: ", found, " of ", job.folder, " stood already"));
   else
     cli.Log(absl::StrCat("wrote ", Counted(result.samples_written, "sample", "samples"), " in ",
@@ -171,6 +197,7 @@ absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_g
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   if (o.like.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(job.spec, MakeSpec(cli, o, job.format, connection.get()));
+    TOUCHSTONE_RETURN_IF_ERROR(NoteCloseCameras(cli, job.spec, connection.get()));
   }
   if (o.slurm.submit) return SubmitToSlurm(cli, o.slurm, connection.get(), std::move(job));
 

@@ -116,8 +116,8 @@ std::string DurationInWords(double seconds) {
 
 absl::StatusOr<double> ParseNumber(absl::string_view text) {
   double value = 0;
-  if (!absl::SimpleAtod(text, &value))
-    return absl::InvalidArgumentError(absl::StrCat("'", text, "' is not a number"));
+  if (!absl::SimpleAtod(text, &value) && !absl::SimpleAtod(WithPlainSigns(text), &value))
+    return absl::InvalidArgumentError(WhyNoNumber(text));
   if (!std::isfinite(value))
     return absl::InvalidArgumentError(absl::StrCat("'", text, "' is not a finite number"));
   return value;

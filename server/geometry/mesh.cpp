@@ -29,16 +29,6 @@ PositionBits BitsOf(const Eigen::Vector3f& position) {
   return bits;
 }
 
-// For every vertex the first vertex at the same place.
-std::vector<uint32_t> FirstAtSamePlace(const std::vector<Eigen::Vector3f>& vertices_m) {
-  absl::flat_hash_map<PositionBits, uint32_t> first_at;
-  first_at.reserve(vertices_m.size());
-  std::vector<uint32_t> first(vertices_m.size());
-  for (uint32_t v = 0; v < vertices_m.size(); ++v)
-    first[v] = first_at.try_emplace(BitsOf(vertices_m[v]), v).first->second;
-  return first;
-}
-
 uint64_t Mix(uint64_t x) {  // the finaliser of SplitMix64
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
@@ -131,6 +121,15 @@ void CountEdges(const TriangleMesh& mesh, MeshReport* report) {
 }
 
 }  // namespace
+
+std::vector<uint32_t> FirstAtSamePlace(const std::vector<Eigen::Vector3f>& vertices_m) {
+  absl::flat_hash_map<PositionBits, uint32_t> first_at;
+  first_at.reserve(vertices_m.size());
+  std::vector<uint32_t> first(vertices_m.size());
+  for (uint32_t v = 0; v < vertices_m.size(); ++v)
+    first[v] = first_at.try_emplace(BitsOf(vertices_m[v]), v).first->second;
+  return first;
+}
 
 bool IsDegenerate(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   return ((b - a).cross(c - a).array() == 0.0).all();

@@ -59,6 +59,9 @@ MeshReport InspectMesh(const TriangleMesh& mesh);
 // order in which they stood; vertices stay as they are.
 TriangleMesh WithoutDegenerateAndDuplicate(TriangleMesh mesh);
 
+// For every vertex the first vertex at the same place, to the last bit.
+std::vector<uint32_t> FirstAtSamePlace(const std::vector<Eigen::Vector3f>& vertices_m);
+
 // Whether three points span no area, judged in double precision.
 bool IsDegenerate(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 

@@ -4,17 +4,23 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
+#include "server/base/utf16.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {
 namespace {
+
+constexpr absl::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr size_t kBytesThatShowAFormat = 4096;  // even: whole characters of UTF-16
 
 // Coordinates beyond this are a wrong unit or a broken file; single precision would not carry them either.
 constexpr double kFarthestM = 1e6;
@@ -22,8 +28,12 @@ constexpr double kFarthestM = 1e6;
 struct Format {
   absl::string_view name;
   absl::Status (*read)(MeshReading*);
+  bool (*looks_like)(absl::string_view bytes);
 };
-constexpr Format kFormats[] = {{"off", ReadOff}, {"obj", ReadObj}, {"stl", ReadStl}, {"ply", ReadPly}};
+constexpr Format kFormats[] = {{"off", ReadOff, LooksLikeOff},
+                               {"obj", ReadObj, LooksLikeObj},
+                               {"stl", ReadStl, LooksLikeStl},
+                               {"ply", ReadPly, LooksLikePly}};
 
 struct MeshUnit {
   absl::string_view name;
@@ -162,13 +172,31 @@ std::vector<std::string> MeshFormatNames() {
 absl::StatusOr<TriangleMesh> ReadMeshFile(const std::string& path, const MeshImport& import,
                                           std::vector<std::string>* notes) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckImport(import));
-  const std::string extension = Extension(path);
-  if (FindNamed(kFormats, extension) == nullptr)
-    return absl::InvalidArgumentError(absl::StrCat(path, ": the extension '", extension,
-                                                   "' names no mesh format",
-                                                   "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
+  if (FindNamed(kFormats, Extension(path)) == nullptr) {
+    // A folder, or a file without an extension that is no mesh, may be large: its beginning says enough.
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return MeshFormatOf(path, "").status();
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path, import.max_bytes));
-  return ReadMeshBytes(path, extension, bytes, import, notes);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string format, MeshFormatOf(path, bytes));
+  return ReadMeshBytes(path, format, bytes, import, notes);
+}
+
+absl::StatusOr<std::string> MeshFormatOf(const std::string& path, absl::string_view bytes) {
+  const std::string extension = Extension(path);
+  if (FindNamed(kFormats, extension) != nullptr) return extension;
+  std::string text;
+  if (IsUtf16(bytes)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(text, Utf8FromUtf16(bytes.substr(0, kBytesThatShowAFormat)));
+    bytes = text;
+  }
+  absl::ConsumePrefix(&bytes, kByteOrderMark);
+  for (const Format& format : kFormats)
+    if (format.looks_like(bytes)) return std::string(format.name);
+  return absl::InvalidArgumentError(absl::StrCat(path, ": the extension '", extension,
+                                                 "' names no mesh format",
+                                                 bytes.empty() ? "" : ", and the file begins like none",
+                                                 "; known: ", absl::StrJoin(MeshFormatNames(), ", ")));
 }
 
 absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string_view format,
@@ -183,9 +211,24 @@ absl::StatusOr<TriangleMesh> ReadMeshBytes(const std::string& name, absl::string
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": has ", bytes.size(), " bytes; at most ", import.max_bytes, " are read"));
   // A byte order mark is no part of any format, but some editors leave one.
-  if (absl::StartsWith(bytes, "\xEF\xBB\xBF")) bytes.remove_prefix(3);
+  absl::ConsumePrefix(&bytes, kByteOrderMark);
+  std::string utf8;
+  if (IsUtf16(bytes)) {
+    absl::StatusOr<std::string> text = Utf8FromUtf16(bytes);
+    if (!text.ok()) return absl::InvalidArgumentError(absl::StrCat(name, ": ", text.status().message()));
+    bytes = utf8 = *std::move(text);
+  }
   MeshReading reading(name, bytes, import);
-  TOUCHSTONE_RETURN_IF_ERROR(reader->read(&reading));
+  if (absl::Status read = reader->read(&reading); !read.ok()) {
+    // What another program called wrongly is told from what is damaged.
+    for (const Format& other : kFormats)
+      if (&other != reader && !reader->looks_like(bytes) && other.looks_like(bytes))
+        return absl::InvalidArgumentError(absl::StrCat(read.message(),
+                                                       "; the file begins like one of format ", other.name,
+                                                       ": .", other.name, " would be its extension"));
+    return read;
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(reading.CheckLastFace());
   absl::StatusOr<TriangleMesh> mesh = Finish(reading, import);
   if (notes != nullptr) *notes = reading.Notes();
   return mesh;

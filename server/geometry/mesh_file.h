@@ -38,7 +38,11 @@ std::vector<std::string> MeshUpAxisNames();  // z, y (turned by 90 deg about x),
 std::vector<std::string> MeshFormatNames();  // what ReadMeshFile reads: off, obj, stl, ply
 std::vector<std::string> WritableMeshFormatNames();  // what WriteMeshFile writes: off, obj
 
-// Reads a mesh; the extension, in any case, names the format. Errors name the file, the line (or byte), what
+// The format of a file: its extension, in any case, or, where that names none, what its bytes begin with. INVALID_ARGUMENT
+// where neither says it.
+absl::StatusOr<std::string> MeshFormatOf(const std::string& path, absl::string_view bytes);
+
+// Reads a mesh of the format that MeshFormatOf gives. Text may be UTF-8 or UTF-16. Errors name the file, the line (or byte), what
 // was found there and what would be right. `notes`, if given, receives a line for everything that was passed
 // over and that a user may want to know (a face with two corners, bytes behind the last triangle). Vertices
 // and triangles keep the file's order; an STL's equal vertices become one.

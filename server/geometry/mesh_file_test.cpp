@@ -138,6 +138,72 @@ TEST_F(MeshFile, TheExtensionNamesTheFormatInAnyCase) {
   EXPECT_FALSE(ReadMeshFile(folder_ / ".off").ok());
 }
 
+TEST_F(MeshFile, WithoutAnExtensionBeginsAsItsFormatDoes) {
+  const std::string
+      obj = "# a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+      ply =
+          "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+          "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 "
+          "2\n";
+  const std::string stl =
+      "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+      "endsolid\n";
+  for (const std::string& bytes : {std::string(kBox), obj, ply, stl, "\xEF\xBB\xBF" + obj})
+    for (const char* name : {"mesh", "mesh.txt"}) {
+      const std::string path = folder_ / name;
+      std::filesystem::remove(path);
+      ASSERT_TRUE(WriteFileAtomically(path, bytes).ok());
+      EXPECT_TRUE(ReadMeshFile(path).ok()) << ReadMeshFile(path).status() << bytes;
+    }
+  const std::string path = folder_ / "letter";
+  ASSERT_TRUE(WriteFileAtomically(path, "Dear all,\n").ok());
+  EXPECT_THAT(std::string(ReadMeshFile(path).status().message()),
+              HasSubstr("names no mesh format, and the file begins like none; known: off, obj, stl, ply"));
+}
+
+TEST(MeshImport, AFileOfAnotherFormatIsNamed) {
+  EXPECT_THAT(std::string(ReadMeshBytes("t.obj", "obj", kBox).status().message()),
+              HasSubstr("begins like one of format off: .off would be its extension"));
+}
+
+TEST(MeshImport, Utf16IsRead) {
+  std::string bytes = "\xFF\xFE";
+  for (const char* c = kBox; *c != 0; ++c) bytes += {*c, '\0'};
+  const auto mesh = ReadMeshBytes("t.off", "off", bytes);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->triangles, ReadMeshBytes("t.off", "off", kBox)->triangles);
+  EXPECT_THAT(
+      std::string(ReadMeshBytes("t.off", "off", bytes.substr(0, bytes.size() - 1)).status().message()),
+      HasSubstr("ends within a character"));
+}
+
+// A tetrahedron whose vertices have the numbers 40 to 43 of 44, with the last corner written as `last`.
+std::string TetrahedronEndingWith(const std::string& last, int first_index) {
+  std::string text = first_index == 1 ? "" : "OFF\n44 4 0\n";
+  const char* const v = first_index == 1 ? "v " : "";
+  for (int k = 0; k < 40; ++k) absl::StrAppend(&text, v, k, " 7 7\n");
+  for (const char* corner : {"0 0 0", "50 0 0", "0 50 0", "0 0 50"}) absl::StrAppend(&text, v, corner, "\n");
+  const auto face = [&](int a, int b) {
+    return absl::StrCat(first_index == 1 ? "f " : "3 ", a + first_index, " ", b + first_index, " ");
+  };
+  absl::StrAppend(&text, face(40, 42), 41 + first_index, "\n", face(40, 41), 43 + first_index, "\n",
+                  face(40, 43), 42 + first_index, "\n", face(41, 42), last);
+  return text;
+}
+
+TEST(MeshImport, ALastLineCutWithinANumberIsRefusedWithItsLine) {
+  for (const auto& [format, first] : {std::pair<const char*, int>{"off", 0}, {"obj", 1}}) {
+    const std::string whole = absl::StrCat(43 + first);
+    EXPECT_TRUE(ReadMeshBytes("t", format, TetrahedronEndingWith(whole, first)).ok()) << format;
+    EXPECT_TRUE(ReadMeshBytes("t", format, TetrahedronEndingWith(whole + "\n", first)).ok());
+    EXPECT_THAT(std::string(ReadMeshBytes("t", format, TetrahedronEndingWith("4", first)).status().message()),
+                AllOf(HasSubstr(first == 0 ? "line 50: " : "line 48: "), HasSubstr("ends with vertex 4"),
+                      HasSubstr("a digit may be cut off")));
+    // With the line's end it stands there as it was meant.
+    EXPECT_TRUE(ReadMeshBytes("t", format, TetrahedronEndingWith("4\n", first)).ok());
+  }
+}
+
 TEST_F(MeshFile, WrittenMeshesReadBackBitForBit) {
   // Floats of every magnitude that a mesh may have, and their neighbours.
   TriangleMesh mesh;

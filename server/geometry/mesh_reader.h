@@ -56,6 +56,10 @@ class MeshReading {
   std::vector<std::string> Notes() const;
   uint64_t skipped_faces() const { return skipped_faces_; }
 
+  // Refuses a text without an end of its last line whose last face may have lost digits or corners: a further digit would
+  // still name a vertex, or all other faces have more corners, and the face leaves an edge of its own open.
+  absl::Status CheckLastFace() const;
+
  private:
   std::string name_;
   absl::string_view bytes_;
@@ -72,6 +76,12 @@ absl::Status ReadOff(MeshReading* reading);
 absl::Status ReadObj(MeshReading* reading);
 absl::Status ReadStl(MeshReading* reading);
 absl::Status ReadPly(MeshReading* reading);
+
+// Whether bytes begin as a file of the format does.
+bool LooksLikeOff(absl::string_view bytes);
+bool LooksLikeObj(absl::string_view bytes);
+bool LooksLikeStl(absl::string_view bytes);
+bool LooksLikePly(absl::string_view bytes);
 
 // Lines of a text; they end in \n, \r\n or \r. The numbers count from 1.
 class LineReader {
@@ -97,6 +107,9 @@ absl::string_view NextWord(absl::string_view* line);
 // The whole word as a finite number or a whole number; a leading + is allowed. Whatever the locale.
 bool ParseReal(absl::string_view word, double* value);
 bool ParseWhole(absl::string_view word, int64_t* value);
+
+// Whether the word is a number, finite or not: what is passed over (colours, normals) may be nan.
+bool IsReal(absl::string_view word);
 
 // A word for a message: in quotes, at most 40 characters, unprintable ones escaped. "nothing" if empty.
 std::string Quoted(absl::string_view word);

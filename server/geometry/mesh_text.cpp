@@ -1,12 +1,14 @@
 // Text and messages that the readers of the mesh formats share.
 #include <absl/strings/charconv.h>
 #include <absl/strings/escaping.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <charconv>
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {
@@ -19,17 +21,8 @@ bool IsBlank(char c) {
 }  // namespace
 
 bool LineReader::Next() {
-  if (rest_.empty()) return false;
+  if (!NextLine(&rest_, &line_)) return false;
   ++number_;
-  size_t end = 0;
-  while (end < rest_.size() && rest_[end] != '\n' && rest_[end] != '\r') ++end;
-  line_ = rest_.substr(0, end);
-  if (end == rest_.size()) {
-    rest_ = {};
-    return true;
-  }
-  const bool two = rest_[end] == '\r' && end + 1 < rest_.size() && rest_[end + 1] == '\n';
-  rest_.remove_prefix(end + (two ? 2 : 1));
   return true;
 }
 
@@ -63,6 +56,15 @@ bool ParseReal(absl::string_view word, double* value) {
     return again.ptr == end && std::abs(*value) <= 1.0;
   }
   return result.ec == std::errc() && result.ptr == end && std::isfinite(*value);
+}
+
+bool IsReal(absl::string_view word) {
+  double ignored;
+  if (ParseReal(word, &ignored)) return true;
+  // As C libraries print what is not finite: nan, -nan(ind), inf; 1.#QNAN, -1.#IND, 1.#INF.
+  if (!word.empty() && (word[0] == '-' || word[0] == '+')) word.remove_prefix(1);
+  return absl::StartsWithIgnoreCase(word, "nan") || absl::StartsWithIgnoreCase(word, "inf") ||
+         absl::StartsWith(word, "1.#");
 }
 
 bool ParseWhole(absl::string_view word, int64_t* value) {

@@ -1,4 +1,5 @@
-// OBJ, Wavefront's text format: one statement per line, a line that ends in \ continues in the next.
+// OBJ, Wavefront's text format: one statement per line, a line that ends in \ continues in the next. Comments and names
+// may end in \ too ("# exported to C:\parts\"); those end with their line.
 //   v x y z [w | r g b]            a vertex
 //   f v/vt/vn v/vt/vn v/vt/vn ...  a face; numbers count from 1, negative ones backwards from the last vertex
 // Groups, materials, textures and normals shape nothing and are passed over, as are points and lines.
@@ -65,23 +66,35 @@ class ObjReader {
   bool NextStatement() {
     if (!lines_.Next()) return false;
     line_ = lines_.number();
-    statement_ = lines_.line();
-    if (Continues(statement_)) {
-      joined_.clear();
-      absl::string_view part = statement_;
-      while (Continues(part)) {
-        part.remove_suffix(1);
-        absl::StrAppend(&joined_, part, " ");
-        part = lines_.Next() ? lines_.line() : absl::string_view();
-      }
-      absl::StrAppend(&joined_, part);
-      statement_ = joined_;
+    statement_ = WithoutComment(lines_.line());
+    absl::string_view rest = statement_;
+    const absl::string_view keyword = NextWord(&rest);
+    if (!Continues(statement_, keyword)) return true;
+    joined_.clear();
+    for (absl::string_view part = statement_;; part = WithoutComment(lines_.line())) {
+      const bool more = Continues(part, keyword);
+      if (more) part.remove_suffix(1);
+      absl::StrAppend(&joined_, part, " ");
+      if (!more || !lines_.Next()) break;
     }
-    statement_ = statement_.substr(0, statement_.find('#'));
+    statement_ = joined_;
     return true;
   }
 
-  static bool Continues(absl::string_view line) { return !line.empty() && line.back() == '\\'; }
+  static absl::string_view WithoutComment(absl::string_view line) { return line.substr(0, line.find('#')); }
+
+  // Whether the statement of that keyword goes on in the next line. One that is passed over may end in a name: where the
+  // next line is a statement itself, the \ was the name's last character.
+  bool Continues(absl::string_view line, absl::string_view keyword) const {
+    if (line.empty() || line.back() != '\\') return false;
+    if (!Holds(kPassedOver, keyword.substr(0, keyword.find('\\')))) return true;
+    LineReader ahead = lines_;
+    if (!ahead.Next()) return false;
+    absl::string_view next = ahead.line();
+    const absl::string_view word = NextWord(&next);
+    return !word.empty() && word[0] != '#' && word != "v" && word != "f" && word != "fo" &&
+           !Holds(kPassedOver, word) && !Holds(kFreeForm, word);
+  }
 
   absl::Status Error(absl::string_view what) const { return reading_->ErrorAtLine(line_, what); }
 
@@ -89,8 +102,7 @@ class ObjReader {
     double point[3];
     TOUCHSTONE_RETURN_IF_ERROR(ParsePoint(*reading_, &rest, line_, point));
     for (absl::string_view word = NextWord(&rest); !word.empty(); word = NextWord(&rest)) {
-      double ignored;  // a weight or a colour
-      if (!ParseReal(word, &ignored))
+      if (!IsReal(word))  // a weight or a colour
         return Error(absl::StrCat("found ", Quoted(word), " behind a vertex; expected numbers only"));
     }
     return reading_->AddPoint(point, line_);
@@ -146,6 +158,14 @@ class ObjReader {
 };
 
 }  // namespace
+
+bool LooksLikeObj(absl::string_view bytes) {
+  LineReader lines(bytes);
+  if (!lines.NextWithContent('#')) return false;
+  absl::string_view line = lines.line();
+  const absl::string_view word = NextWord(&line);
+  return word == "v" || word == "f" || Holds(kPassedOver, word);
+}
 
 absl::Status ReadObj(MeshReading* reading) {
   return ObjReader(reading).Read();

@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::geometry {
@@ -28,6 +30,46 @@ TEST(Obj, ReadsAllFormsOfCorners) {
     EXPECT_EQ(mesh->triangles, (Triangles{{0, 1, 2}})) << face;
     EXPECT_EQ(mesh->vertices_m[2], Eigen::Vector3f(1e-3f, 1e-3f, 0));
   }
+}
+
+// A tetrahedron with edges of 50 along the axes.
+const std::string kFourVertices = "v 0 0 0\nv 50 0 0\nv 0 50 0\nv 0 0 50\n";
+const std::string kFourFaces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+TEST(Obj, CommentsAndNamesMayEndInABackslash) {
+  for (const std::string& text :
+       {"# exported to C:\\parts\\\n" + kFourVertices + kFourFaces, "o part\\\n" + kFourVertices + kFourFaces,
+        "mtllib C:\\m\\\r\n" + kFourVertices + kFourFaces, kFourVertices + "# C:\\x\\\n" + kFourFaces,
+        kFourVertices + "g a\\\n# c\n" + kFourFaces, kFourVertices + "usemtl steel\\\n" + kFourFaces,
+        kFourVertices + "vn 0 0 1\\\n" + kFourFaces,
+        kFourVertices + "f 1 3 2 # C:\\\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+        kFourVertices + kFourFaces + "g end\\"}) {
+    const absl::StatusOr<TriangleMesh> mesh = ReadObj(text);
+    ASSERT_TRUE(mesh.ok()) << text << mesh.status();
+    EXPECT_EQ(mesh->vertices_m.size(), 4u) << text;
+    EXPECT_EQ(mesh->triangles, (Triangles{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})) << text;
+  }
+}
+
+TEST(Obj, NamesAndNumbersThatArePassedOverContinueInTheNextLine) {
+  for (const char* continued : {"g one \\\ntwo three\n", "vn 0 0 \\\n1\n", "vn 0 \\\n0 \\\n1\n"}) {
+    const absl::StatusOr<TriangleMesh> mesh = ReadObj(kFourVertices + continued + kFourFaces);
+    ASSERT_TRUE(mesh.ok()) << continued << mesh.status();
+    EXPECT_EQ(mesh->triangles.size(), 4u);
+  }
+}
+
+TEST(Obj, ColoursMayBeNotANumberButPlacesMayNot) {
+  EXPECT_TRUE(ReadObj("v 0 0 0 nan nan nan\nv 50 0 0 -nan(ind) 0 1.#QNAN\nv 0 50 0\nf 1 2 3\n").ok());
+  EXPECT_THAT(ObjRefusal("v 0 0 0\nv 50 nan 0\nv 0 50 0\nf 1 2 3\n"), HasSubstr("line 2: found 'nan'"));
+}
+
+TEST(Obj, BareCarriageReturnsEndLines) {
+  std::string text = "# C:\\parts\\\n" + kFourVertices + kFourFaces;
+  std::replace(text.begin(), text.end(), '\n', '\r');
+  const absl::StatusOr<TriangleMesh> mesh = ReadObj(text);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->triangles.size(), 4u);
 }
 
 TEST(Obj, NegativeNumbersCountBackFromTheFace) {

@@ -4,6 +4,7 @@
 //   n i1 ... in [colour]
 // http://www.geomview.org/docs/html/OFF.html
 #include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
 
 #include "server/base/status.h"
 #include "server/geometry/mesh_reader.h"
@@ -16,6 +17,14 @@ struct Counts {
   uint64_t faces = 0;
 };
 
+// Takes [ST][C][N]OFF off the front of a word; false: it is something else.
+bool ConsumeKeyword(absl::string_view* word) {
+  absl::ConsumePrefix(word, "ST");
+  absl::ConsumePrefix(word, "C");
+  absl::ConsumePrefix(word, "N");
+  return absl::ConsumePrefix(word, "OFF");
+}
+
 // Reads the keyword; what is left of its line stays in `line`.
 absl::Status ReadKeyword(const MeshReading& reading, LineReader* lines, absl::string_view* line) {
   if (!lines->NextWithContent('#'))
@@ -23,15 +32,11 @@ absl::Status ReadKeyword(const MeshReading& reading, LineReader* lines, absl::st
   *line = lines->line();
   absl::string_view word = NextWord(line);
   const absl::string_view whole = word;
-  if (word.size() > 2 && word.substr(0, 2) == "ST") word.remove_prefix(2);
-  if (word.size() > 3 && word[0] == 'C') word.remove_prefix(1);
-  if (word.size() > 3 && word[0] == 'N') word.remove_prefix(1);
-  if (word.substr(0, 3) != "OFF")
+  if (!ConsumeKeyword(&word))
     return reading.ErrorAtLine(lines->number(),
                                absl::StrCat("found ", Quoted(whole), "; an OFF file begins with the word OFF",
                                             " (three dimensions; 4OFF and nOFF are not read)"));
   // Some data sets forget the blank: "OFF490 518 0".
-  word.remove_prefix(3);
   if (!word.empty()) *line = absl::string_view(word.data(), line->data() + line->size() - word.data());
   absl::string_view peek = *line;
   if (NextWord(&peek) == "BINARY")
@@ -79,8 +84,7 @@ absl::Status ReadVertices(uint64_t count, LineReader* lines, MeshReading* readin
     // unless a texture. A face's line in the vertices' place shows here.
     int more = 0;
     for (absl::string_view word = NextWord(&line); !word.empty(); word = NextWord(&line), ++more) {
-      double ignored;
-      if (!ParseReal(word, &ignored))
+      if (!IsReal(word))
         return reading->ErrorAtLine(lines->number(), absl::StrCat("found ", Quoted(word), " behind vertex ",
                                                                   v, "; expected numbers only"));
     }
@@ -128,6 +132,14 @@ absl::Status ReadFaces(uint64_t count, LineReader* lines, MeshReading* reading) 
 }
 
 }  // namespace
+
+bool LooksLikeOff(absl::string_view bytes) {
+  LineReader lines(bytes);
+  if (!lines.NextWithContent('#')) return false;
+  absl::string_view line = lines.line();
+  absl::string_view word = NextWord(&line);
+  return ConsumeKeyword(&word);
+}
 
 absl::Status ReadOff(MeshReading* reading) {
   LineReader lines(reading->bytes());

@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
 
 namespace touchstone::geometry {
 namespace ply {
@@ -98,7 +99,8 @@ class BodyReader {
   absl::Status ReadList(const Property& property, uint64_t row, bool is_corners) {
     double length;
     TOUCHSTONE_RETURN_IF_ERROR(rows_.Number(property.count_type, property, &length));
-    if (length < 0 || length > static_cast<double>(rows_.bytes_left_in_row() / rows_.MinBytes(property.type)))
+    if (!(length >= 0) ||
+        length > static_cast<double>(rows_.bytes_left_in_row() / rows_.MinBytes(property.type)))
       return rows_.Error(absl::StrCat("row ", row, " has a list ", Quoted(property.name), " of ", length,
                                       " entries, which do not stand there"));
     if (is_corners) corners_.clear();
@@ -106,8 +108,8 @@ class BodyReader {
       double value;
       TOUCHSTONE_RETURN_IF_ERROR(rows_.Number(property.type, property, &value));
       if (!is_corners) continue;
-      if (value < 0 || value >= static_cast<double>(reading_.limits().max_vertices))
-        return rows_.Error(absl::StrCat("face ", row, " uses vertex ", static_cast<int64_t>(value),
+      if (!(value >= 0 && value < static_cast<double>(reading_.limits().max_vertices)))
+        return rows_.Error(absl::StrCat("face ", row, " uses vertex ", ShortestNumber(value),
                                         "; expected the number of a vertex, from 0 on"));
       corners_.push_back(static_cast<uint32_t>(value));
       if (corners_.back() > highest_) {
@@ -132,6 +134,13 @@ class BodyReader {
 
 }  // namespace
 }  // namespace ply
+
+bool LooksLikePly(absl::string_view bytes) {
+  LineReader lines(bytes);
+  if (!lines.Next()) return false;
+  absl::string_view line = lines.line();
+  return NextWord(&line) == "ply";
+}
 
 absl::Status ReadPly(MeshReading* reading) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const ply::Header header, ply::ReadHeader(*reading));

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "server/base/nan.h"
 #include "server/geometry/ply.h"
 
 namespace touchstone::geometry::ply {
@@ -25,6 +26,11 @@ class TextRows final : public Rows {
   absl::Status Number(Type type, const Property& property, double* value) override {
     const absl::string_view word = NextWord(&rest_);
     int64_t whole;
+    // What is not finite is refused where it is a place, and passed over where it is a colour or a normal.
+    if (!ParseReal(word, value) && IsReal(word)) {
+      *value = kNaN;
+      return absl::OkStatus();
+    }
     if (IsWholeType(type) ? !ParseWhole(word, &whole) : !ParseReal(word, value))
       return Error(absl::StrCat("found ", Quoted(word), " for ", Quoted(property.name),
                                 "; the header describes a ", IsWholeType(type) ? "whole" : "finite",

@@ -1,4 +1,5 @@
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,6 +26,30 @@ const std::string kFace = "element face 1\nproperty list uchar int vertex_indice
 
 std::string Text(const std::string& elements, const std::string& rows) {
   return "ply\nformat ascii 1.0\n" + elements + "end_header\n" + rows;
+}
+
+TEST(Ply, MarksWhereFilesWerePutTogetherArePassedOver) {
+  const std::string rows = "0 0 0\n50 0 0\n0 50 0\n0 0 50\n3 0 2 1\n";
+  for (const char* end : {"\n", "\r", "\r\n"}) {
+    const std::string text = absl::StrReplaceAll(Text(kVertex + kFace, "\xEF\xBB\xBF" + rows), {{"\n", end}});
+    const auto mesh = Read(text);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->triangles, (Triangles{{0, 2, 1}}));
+  }
+}
+
+TEST(Ply, ColoursMayBeNotANumberButPlacesMayNot) {
+  const std::string elements =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float red\nproperty "
+      "uchar "
+      "green\n" +
+      kFace;
+  EXPECT_TRUE(Read(Text(elements, "0 0 0 nan 1\n50 0 0 -nan nan\n0 50 0 inf 3\n3 0 1 2\n")).ok())
+      << Refusal(Text(elements, "0 0 0 nan 1\n50 0 0 -nan nan\n0 50 0 inf 3\n3 0 1 2\n"));
+  EXPECT_THAT(Refusal(Text(elements, "0 0 nan 0 1\n50 0 0 0 2\n0 50 0 0 3\n3 0 1 2\n")),
+              HasSubstr("the coordinate nan; only finite numbers are places"));
+  EXPECT_THAT(Refusal(Text(elements, "0 0 0 0 1\n50 0 0 0 2\n0 50 0 0 3\n3 0 1 nan\n")),
+              HasSubstr("face 0 uses vertex nan"));
 }
 
 // Appends numbers of any type in either byte order.

@@ -49,9 +49,12 @@ uint32_t CountAt80(absl::string_view bytes) {
   return count;
 }
 
+bool HasTheSizeOfItsCount(absl::string_view bytes) {
+  return bytes.size() >= kHeaderBytes && bytes.size() == kHeaderBytes + kTriangleBytes * CountAt80(bytes);
+}
+
 bool IsText(absl::string_view bytes) {
-  if (bytes.size() >= kHeaderBytes && bytes.size() == kHeaderBytes + kTriangleBytes * CountAt80(bytes))
-    return false;
+  if (HasTheSizeOfItsCount(bytes)) return false;
   const absl::string_view start = absl::StripLeadingAsciiWhitespace(bytes.substr(0, 1024));
   if (!absl::StartsWithIgnoreCase(start, "solid")) return false;
   // "solid" and then unprintable bytes is a binary file, cut off or with more behind it.
@@ -179,6 +182,10 @@ class TextReader {
 };
 
 }  // namespace
+
+bool LooksLikeStl(absl::string_view bytes) {
+  return HasTheSizeOfItsCount(bytes) || IsText(bytes);
+}
 
 absl::Status ReadStl(MeshReading* reading) {
   if (reading->bytes().empty())

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <tuple>
 
 #include "server/base/units.h"
@@ -15,6 +16,8 @@ namespace {
 // Grey levels that the sensor's noise is cut off at: below 3 standard deviations of most cameras' noise.
 constexpr float kBlack = 10, kWhite = 245, kMaxHiddenNoise = 4;
 constexpr int kTerms = 10;
+constexpr double kGroundShare = 0.06;  // of the ground's grey: so near it a pixel is counted as ground
+constexpr double kMinGain = 1.2;       // of such pixels, for a ground that is followed from farther away
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 
 // Polynomial terms at a pixel, coordinates from -1 to 1.
@@ -189,11 +192,21 @@ Plane FitGround(const Plane& grey, float noise) {
   // Light that falls off bends the rim away from a plane, then the middle away from the rim.
   for (const double share : {0.12, 0.08, 0.05, 0.04})
     fit = FitTerms(grey, Agreeing(grey, rim, fit, noise, share), 6);
-  for (const double share : {0.10, 0.06, 0.04, 0.03, 0.03}) {
-    const std::vector<GroundSample> agreeing = Agreeing(grey, all, fit, noise, share);
-    if (agreeing.size() < all.size() / 20) break;
-    fit = FitTerms(grey, agreeing, share > 0.05 ? 6 : kTerms);
-  }
+  const Terms from_rim = fit;
+  const auto follow = [&](const std::initializer_list<double>& shares) {
+    fit = from_rim;
+    for (const double share : shares) {
+      const std::vector<GroundSample> agreeing = Agreeing(grey, all, fit, noise, share);
+      if (agreeing.size() < all.size() / 20) break;
+      fit = FitTerms(grey, agreeing, share > 0.05 ? 6 : kTerms);
+    }
+    return Agreeing(grey, all, fit, noise, kGroundShare).size();
+  };
+  const size_t near = follow({0.10, 0.06, 0.04, 0.03, 0.03});
+  const Terms near_fit = fit;
+  // Light that falls off faster than the rim tells is followed from farther away; that has to pay.
+  const size_t far = follow({0.5, 0.4, 0.3, 0.2, 0.15, 0.10, 0.08, 0.05, 0.04, 0.03});
+  if (static_cast<double>(far) < kMinGain * static_cast<double>(near)) fit = near_fit;
   Plane ground(grey.width, grey.height);
   for (int y = 0; y < grey.height; ++y)
     for (int x = 0; x < grey.width; ++x)

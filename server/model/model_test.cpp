@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/base/text.h"
 #include "server/model/parameter_values.h"
+#include "server/model/yaml_tree.h"
 
 namespace touchstone::model {
 namespace {
@@ -94,7 +96,7 @@ TEST(ModelFile, NamesThePlaceTheValueAndWhatWouldBeRight) {
   EXPECT_EQ(ErrorOf(File("effcts: []\n")),
             "m.yaml:3:1: a model file has no 'effcts', did you mean 'effects'?");
   EXPECT_EQ(ErrorOf(File("effects:\n  - tip_radius: {radius_mm: wide}\n")),
-            "m.yaml:4:29: tip_radius.radius_mm: 'wide' is not a number");
+            "m.yaml:4:29: tip_radius.radius_mm: 'wide' is not a number; one like 12.5 was expected");
   EXPECT_THAT(ErrorOf(File("effects:\n  - tip_radius: {radius_mm: .nan}\n")), HasSubstr("m.yaml:4:29"));
   EXPECT_THAT(ErrorOf(File("effects:\n  - tip_radius: {radius_mm: nan}\n")),
               HasSubstr("not a finite number"));
@@ -184,6 +186,16 @@ TEST(ModelHash, IsAboutPhysicsAndNotAboutTheName) {
   EXPECT_NE(added.Hash(), hash);
   EXPECT_NE(AddEffect(NominalModel(), "tip_radius", {"radius_mm=1", "scope=object"}, kCatalogue)->Hash(),
             added.Hash());
+}
+
+TEST(Yaml, LinesMayEndInCarriageReturnsAndNumbersHaveUnicodeSigns) {
+  for (const char* text : {"a: 1\rb: \xE2\x88\x92""2.5\r", "a: 1\r\nb: \xE2\x88\x92""2.5\r\n"}) {
+    const auto tree = ParseYaml(text, "m.yaml");
+    ASSERT_TRUE(tree.ok()) << tree.status();
+    ASSERT_NE(tree->Find("b"), nullptr);
+    EXPECT_EQ(tree->Find("b")->line, 2);
+    EXPECT_EQ(*ParseNumber(tree->Find("b")->text), -2.5);
+  }
 }
 
 TEST(FileNumber, PrintsWhatAPersonWouldHaveWritten) {

@@ -53,11 +53,11 @@ absl::Status CheckMapName(const std::string& origin, size_t line, absl::string_v
 absl::StatusOr<std::map<std::string, SurfaceMapObject>> ParseSurfaceMap(const std::string& text,
                                                                         const std::string& origin) {
   std::map<std::string, SurfaceMapObject> objects;
-  const std::vector<absl::string_view> lines = absl::StrSplit(text, '\n');
+  absl::string_view rest = text, whole_line;
   const std::string header = absl::StrJoin(kMapHeader, ",");
   bool begun = false;
-  for (size_t number = 1; number <= lines.size(); ++number) {
-    const absl::string_view line = absl::StripTrailingAsciiWhitespace(lines[number - 1]);
+  for (size_t number = 1; NextLine(&rest, &whole_line); ++number) {
+    const absl::string_view line = absl::StripTrailingAsciiWhitespace(whole_line);
     if (line.empty() || (!begun && line[0] == '#')) continue;
     if (!begun) {
       if (line != header)

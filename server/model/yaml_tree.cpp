@@ -10,6 +10,9 @@
 #include <sstream>
 #include <unordered_set>
 
+#include "server/base/text.h"
+#include "server/base/utf16.h"
+
 namespace touchstone::model {
 namespace {
 
@@ -129,6 +132,14 @@ absl::Status ErrorAtMark(const std::string& origin, const YAML::Mark& mark, absl
   return ErrorAt(origin, place, message);
 }
 
+// The text with \n where lines end in \r alone, which the parser takes for a space. UTF-16, which it reads, stays.
+std::string WithLineFeeds(const std::string& text) {
+  if (!absl::StrContains(text, '\r') || IsUtf16(text)) return text;
+  std::string with;
+  for (absl::string_view rest = text, line; NextLine(&rest, &line);) absl::StrAppend(&with, line, "\n");
+  return with;
+}
+
 // What is probably wrong, for the mistakes that people make most.
 const char* HintFor(const YAML::Exception& error, const std::string& text) {
   if (absl::StrContains(error.msg, "end of map flow")) return "; is a '}' or a comma missing?";
@@ -171,7 +182,7 @@ absl::StatusOr<YamlNode> ParseYaml(const std::string& text, const std::string& o
     return absl::InvalidArgumentError(
         absl::StrCat(origin, ": has ", text.size(), " bytes; at most ", kMaxYamlBytes, " are read"));
   try {
-    std::istringstream stream(text);
+    std::istringstream stream(WithLineFeeds(text));
     YAML::Parser parser(stream);
     TreeBuilder builder;
     if (!parser.HandleNextDocument(builder))

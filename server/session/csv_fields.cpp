@@ -12,6 +12,8 @@
 #include <cstdint>
 
 #include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/session/plain_csv.h"
 
 namespace touchstone::session {
 namespace {
@@ -22,36 +24,38 @@ constexpr size_t kMaxFields = 65'536;
 }  // namespace
 
 absl::StatusOr<CsvLines> CsvLines::Open(absl::string_view text, const std::string& origin) {
-  if (absl::StartsWith(text, "\xFF\xFE") || absl::StartsWith(text, "\xFE\xFF"))
-    return absl::InvalidArgumentError(
-        absl::StrCat(origin, ":1: is UTF-16; UTF-8 was expected (CSV UTF-8 in spreadsheets)"));
-  absl::ConsumePrefix(&text, "\xEF\xBB\xBF");
   CsvLines lines;
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<PlainCsv> plain, ConvertToPlainCsv(text, origin));
+  if (plain) {
+    lines.converted_ = std::make_shared<const std::string>(std::move(plain->text));
+    lines.number_ = plain->skipped_lines;
+    text = *lines.converted_;
+  }
   lines.rest_ = text;
   return lines;
 }
 
 bool CsvLines::Next(absl::string_view* line) {
-  if (rest_.empty()) return false;
-  const size_t end = std::min(rest_.find('\n'), rest_.size());
-  *line = rest_.substr(0, end);
-  rest_.remove_prefix(std::min(end + 1, rest_.size()));
+  if (!NextLine(&rest_, line)) return false;
   ++number_;
   return true;
 }
 
 size_t CsvLines::left() const {
-  return std::count(rest_.begin(), rest_.end(), '\n') + 1;
+  return std::count_if(rest_.begin(), rest_.end(), [](char c) { return c == '\n' || c == '\r'; }) + 1;
 }
 
 absl::StatusOr<std::vector<std::string>> ReadCsvHeader(const std::string& origin, absl::string_view example,
                                                        size_t max_columns, CsvLines* lines,
                                                        CsvFields* fields) {
   const auto wrong = [&](absl::string_view what) {
-    return absl::InvalidArgumentError(absl::StrCat(origin, ":1: ", what));
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":", lines->number(), ": ", what));
   };
   absl::string_view header;
-  if (!lines->Next(&header) || absl::StripAsciiWhitespace(header).empty())
+  const bool any = lines->Next(&header);
+  if (!any)
+    return absl::InvalidArgumentError(absl::StrCat(origin, ":1: a header line was expected (", example, ")"));
+  if (absl::StripAsciiWhitespace(header).empty())
     return wrong(absl::StrCat("a header line was expected (", example, ")"));
   if (absl::Status status = fields->Cut(header); !status.ok()) return wrong(status.message());
   const size_t columns = fields->all().size();
@@ -62,16 +66,18 @@ absl::StatusOr<std::vector<std::string>> ReadCsvHeader(const std::string& origin
 
 absl::StatusOr<double> FieldNumber(absl::string_view field) {
   if (field.empty()) return absl::InvalidArgumentError("is empty; a number was expected");
-  absl::string_view digits = field;
-  if (digits[0] == '+') digits.remove_prefix(1);
   double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error == std::errc::result_out_of_range && end == digits.data() + digits.size())
+  const auto reads = [&value](absl::string_view digits) {
+    const bool doubled_sign = digits.size() > 1 && digits[0] == '+' && (digits[1] == '-' || digits[1] == '+');
+    if (digits[0] == '+') digits.remove_prefix(1);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return end != digits.data() + digits.size() || doubled_sign ? std::errc::invalid_argument : error;
+  };
+  std::errc error = reads(field);
+  if (error == std::errc::invalid_argument) error = reads(WithPlainSigns(field));
+  if (error == std::errc::result_out_of_range)
     return absl::InvalidArgumentError(absl::StrCat("'", Shown(field), "' is beyond what a double holds"));
-  const bool doubled_sign = field[0] == '+' && !digits.empty() && (digits[0] == '-' || digits[0] == '+');
-  if (error != std::errc() || end != digits.data() + digits.size() || doubled_sign)
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", Shown(field), "' is not a number; one like 12.5 was expected"));
+  if (error != std::errc()) return absl::InvalidArgumentError(WhyNoNumber(field));
   return value;
 }
 
@@ -114,14 +120,15 @@ absl::Status CsvFields::Cut(absl::string_view line) {
     if (fields_.size() >= kMaxFields)
       return absl::InvalidArgumentError(absl::StrCat("has more than ", kMaxFields, " fields"));
     size_t start = begin;
-    while (start < line.size() && (line[start] == ' ' || line[start] == '\t')) ++start;
+    while (start < line.size() && line[start] != separator_ && (line[start] == ' ' || line[start] == '\t'))
+      ++start;
     if (start < line.size() && line[start] == '"') {
       TOUCHSTONE_ASSIGN_OR_RETURN(const size_t end, CutQuoted(line, start, quoted++));
       if (end == line.size()) break;
       begin = end + 1;
       continue;
     }
-    const size_t comma = std::min(line.find(',', begin), line.size());
+    const size_t comma = std::min(line.find(separator_, begin), line.size());
     fields_.push_back(absl::StripAsciiWhitespace(line.substr(begin, comma - begin)));
     if (comma == line.size()) break;
     begin = comma + 1;
@@ -145,11 +152,11 @@ absl::StatusOr<size_t> CsvFields::CutQuoted(absl::string_view line, size_t start
       break;
     }
   }
-  const size_t comma = std::min(line.find(',', i + 1), line.size());
+  const size_t comma = std::min(line.find(separator_, i + 1), line.size());
   if (!absl::StripAsciiWhitespace(line.substr(i + 1, comma - i - 1)).empty())
     return absl::InvalidArgumentError(
         absl::StrCat("field ", fields_.size() + 1, " goes on after its closing quote with '",
-                     Shown(line.substr(i + 1, comma - i - 1)), "'; a comma was expected"));
+                     Shown(line.substr(i + 1, comma - i - 1)), "'; a separator was expected"));
   fields_.push_back(absl::StripAsciiWhitespace(text));
   return comma;
 }

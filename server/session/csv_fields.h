@@ -11,33 +11,39 @@
 
 namespace touchstone::session {
 
-// Cuts a line at its commas. A field in quotes may hold commas and doubled quotes, but no line end.
+// Cuts a line at its separators, commas unless said otherwise. A field in quotes may hold separators and doubled quotes, but
+// no line end.
 class CsvFields {
  public:
+  explicit CsvFields(char separator = ',') : separator_(separator) {}
+
   // Views into `line`, or into this object where a field was quoted; they last until the next call. INVALID_ARGUMENT for a
   // line of more than 65,536 fields, which are no longer cut.
   absl::Status Cut(absl::string_view line);
   const std::vector<absl::string_view>& all() const { return fields_; }
 
  private:
-  // Returns where the comma behind the field stands, or the end of the line.
+  // Returns where the separator behind the field stands, or the end of the line.
   absl::StatusOr<size_t> CutQuoted(absl::string_view line, size_t start, size_t number);
 
+  char separator_;
   std::vector<absl::string_view> fields_;
   std::vector<std::unique_ptr<std::string>> unquoted_;
 };
 
-// The lines of a CSV file, header first, whichever way they end.
+// The lines of a CSV file, header first, whichever way they end, in the plain form (plain_csv.h).
 class CsvLines {
  public:
-  // INVALID_ARGUMENT for UTF-16. A byte-order mark, with which files from spreadsheets begin, is skipped.
+  // INVALID_ARGUMENT where the file is not certain to mean one thing, with the line and column. A byte-order mark, with which
+  // files from spreadsheets begin, is skipped.
   static absl::StatusOr<CsvLines> Open(absl::string_view text, const std::string& origin);
-  // False at the end. Lines are counted from 1.
+  // False at the end. Lines are counted from 1 as they stand in the file.
   bool Next(absl::string_view* line);
   int number() const { return number_; }
   size_t left() const;  // lines to come, at most: empty ones count
 
  private:
+  std::shared_ptr<const std::string> converted_;  // what rest_ looks at, where the file is not plain
   absl::string_view rest_;
   int number_ = 0;
 };

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "server/base/text.h"
+
 namespace touchstone::session {
 
 std::string ShellWord(const std::string& word) {
@@ -30,6 +32,15 @@ std::vector<std::string> RawFields(absl::string_view line) {
     }
   }
   return fields;
+}
+
+std::vector<absl::string_view> LinesWithEnds(absl::string_view text) {
+  std::vector<absl::string_view> lines;
+  for (absl::string_view rest = text, line; NextLine(&rest, &line);) {
+    const size_t begin = lines.empty() ? 0 : lines.back().data() + lines.back().size() - text.data();
+    lines.push_back(text.substr(begin, text.size() - rest.size() - begin));
+  }
+  return lines;
 }
 
 std::vector<std::string> RenameOptions(const std::vector<std::pair<std::string, std::string>>& renames) {

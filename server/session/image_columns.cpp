@@ -54,9 +54,6 @@ bool ImageColumnOf(const std::string& name, ImageColumn* column) {
 absl::Status WrongImageColumn(const std::vector<std::string>& names, size_t i, const std::string& line) {
   const std::string& name = names[i];
   const std::string place = absl::StrCat(line, "column ", i + 1, " '", Shown(name), "' ");
-  if (names.size() == 1 && absl::StrContains(name, ';'))
-    return absl::InvalidArgumentError(
-        absl::StrCat(line, "fields are separated by ';' where commas were expected (and points in numbers)"));
   if (name.empty())
     return absl::InvalidArgumentError(
         absl::StrCat(place, "has no name; is there a comma too many in the header?"));

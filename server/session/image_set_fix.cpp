@@ -151,7 +151,7 @@ void RenameAndNumber(const std::vector<std::pair<std::string, std::string>>& ren
 }  // namespace
 
 bool ImageSetFix::empty() const {
-  return shift_rows == 0 && !changes_pixels() && rename_objects.empty() && scale_camera == 1 &&
+  return !plain_text && shift_rows == 0 && !changes_pixels() && rename_objects.empty() && scale_camera == 1 &&
          scale_focal == 1 && scale_lengths == 1 && !axes && !swap_eye_at && !up;
 }
 
@@ -187,6 +187,7 @@ std::string FixOptions(const ImageSetFix& fix) {
       ranges.push_back(first == last ? absl::StrCat(first) : absl::StrCat(first, "-", last));
     options.push_back("--images " + absl::StrJoin(ranges, ","));
   }
+  if (fix.plain_text) options.push_back("--plain");
   if (fix.shift_rows != 0) options.push_back(absl::StrCat("--shift-rows=", fix.shift_rows));
   if (fix.rotate_deg != 0) options.push_back(absl::StrCat("--rotate ", fix.rotate_deg));
   if (fix.mirror != ImageSetFix::Mirror::kNone)

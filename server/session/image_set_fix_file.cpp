@@ -15,6 +15,7 @@
 #include "server/session/csv_fields.h"
 #include "server/session/fix_text.h"
 #include "server/session/image_set_fix.h"
+#include "server/session/plain_csv.h"
 
 namespace touchstone::session {
 namespace {
@@ -85,7 +86,11 @@ absl::StatusOr<FixedImageSet> FixImageSet(const ImageSet& set, absl::string_view
   FixedImageSet fixed;
   fixed.set = set;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> left, ApplyFix(fix, &fixed.set));
-  std::vector<absl::string_view> lines = absl::StrSplit(images_csv, '\n');
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PlainCsv> plain,
+                              ConvertToPlainCsv(images_csv, set.origin, fix.plain_text));
+  if (plain) images_csv = plain->text;
+  const int first_line = plain ? plain->skipped_lines + 1 : 1;
+  const std::vector<absl::string_view> lines = LinesWithEnds(images_csv);
   absl::string_view header = absl::StripTrailingAsciiWhitespace(lines[0]);
   fixed.images_csv = absl::StrCat(header, "\n");
   absl::ConsumePrefix(&header, "\xEF\xBB\xBF");
@@ -93,7 +98,8 @@ absl::StatusOr<FixedImageSet> FixImageSet(const ImageSet& set, absl::string_view
   TOUCHSTONE_RETURN_IF_ERROR(columns.Cut(header));
   for (size_t row = 0; row < left.size(); ++row) {
     const PhotographRow &was = set.photographs[left[row]], &is = fixed.set.photographs[row];
-    std::vector<std::string> fields = RawFields(absl::StripTrailingAsciiWhitespace(lines[was.line - 1]));
+    std::vector<std::string> fields =
+        RawFields(absl::StripTrailingAsciiWhitespace(lines[was.line - first_line]));
     for (size_t i = 0; i < std::min(fields.size(), columns.all().size()); ++i)
       FixField(std::string(absl::StripAsciiWhitespace(columns.all()[i])), set, was, fixed.set, is,
                &fields[i]);

@@ -149,9 +149,6 @@ absl::StatusOr<Columns> ReadColumns(const std::vector<std::string>& names, const
           absl::StrCat(place, "stands twice in the header, first as column ", at->second));
     Column column;
     if (!ColumnOf(name, &column)) {
-      if (names.size() == 1 && name.find(';') != std::string::npos)
-        return absl::InvalidArgumentError(absl::StrCat(
-            line, "fields are separated by ';' where commas were expected (and points in numbers)"));
       if (name.empty())
         return absl::InvalidArgumentError(
             absl::StrCat(place, "has no name; is there a comma too many in the header?"));

@@ -219,7 +219,7 @@ absl::StatusOr<std::vector<int>> ApplyToTouches(const MeasurementFix& fix, Measu
 }  // namespace
 
 bool MeasurementFix::empty() const {
-  return !drop_duplicates && !drop_stale && shift_rows == 0 && finger_order.empty() &&
+  return !plain_text && !drop_duplicates && !drop_stale && shift_rows == 0 && finger_order.empty() &&
          rename_objects.empty() && scale_times == 1 && scale_targets == 1 && scale_standoff == 1 &&
          scale_speed == 1 && !axes && !reverse_approach && !reverse_lateral && move_objects_m.empty();
 }
@@ -269,6 +269,7 @@ std::string FixOptions(const MeasurementFix& fix, int fingers) {
       ranges.push_back(first == last ? absl::StrCat(first) : absl::StrCat(first, "-", last));
     options.push_back("--touches " + absl::StrJoin(ranges, ","));
   }
+  if (fix.plain_text) options.push_back("--plain");
   if (fix.drop_duplicates) options.push_back("--drop-duplicates");
   if (fix.drop_stale) options.push_back("--drop-stale");
   if (fix.shift_rows != 0) options.push_back(absl::StrCat("--shift-rows=", fix.shift_rows));

@@ -21,6 +21,7 @@ struct MeasurementFix {
   // Only these touches are wrong, by their numbers, first and last; empty: all of the file. The other rows stay as
   // they are, and no time moves between them and these.
   std::vector<std::pair<uint64_t, uint64_t>> touches;
+  bool plain_text = false;  // UTF-8, commas, decimal points, '-' for minus, ends of all lines (plain_csv.h)
   bool drop_duplicates = false;  // rows whose touch and times all repeat an earlier row's, digit for digit
   bool drop_stale = false;       // rows that RepeatsRow says to repeat the row before
   int shift_rows = 0;  // the times of row k belong to row k + shift_rows; rows that get none are dropped

@@ -15,6 +15,7 @@
 #include "server/session/fix_text.h"
 #include "server/session/measurement_columns.h"
 #include "server/session/measurement_fix.h"
+#include "server/session/plain_csv.h"
 
 namespace touchstone::session {
 namespace {
@@ -106,17 +107,15 @@ void MendRow(const Columns& columns, const MeasurementSet& before, int old_row, 
 
 absl::StatusOr<std::string> FixMeasurementFile(absl::string_view csv, const std::string& origin,
                                                const MeasurementFix& fix) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<PlainCsv> plain,
+                              ConvertToPlainCsv(csv, origin, fix.plain_text));
+  if (plain) csv = plain->text;
   TOUCHSTONE_ASSIGN_OR_RETURN(const MeasurementSet before, ParseMeasurementSet(csv, origin));
   MeasurementSet after = before;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> left, ApplyFix(fix, &after));
 
   std::string text;
-  std::vector<absl::string_view> lines;  // with their ends
-  while (!csv.empty()) {
-    const size_t end = std::min(csv.find('\n'), csv.size() - 1) + 1;
-    lines.push_back(csv.substr(0, end));
-    csv.remove_prefix(end);
-  }
+  const std::vector<absl::string_view> lines = LinesWithEnds(csv);
   absl::string_view header = lines[0];
   text.append(header.data(), header.size());
   absl::ConsumePrefix(&header, "\xEF\xBB\xBF");

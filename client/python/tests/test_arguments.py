@@ -14,7 +14,7 @@ ONE = {"target_mm": (0, 0, 0), "approach": (0, 0, -1), "lateral": (1, 0, 0), "st
 
 @pytest.mark.parametrize("arguments, says", [
     (dict(objects=[]), "objects is"),
-    (dict(objects=["a"], plan="sphere"), "plan is str"),
+    (dict(objects=["a"], plan="sphere"), "plan is 'sphere'; give touchstone.sphere"),
     (dict(objects=["a"]), "samples is missing"),
     (dict(objects=["a"], samples=0), "samples is 0"),
     (dict(objects=["a"], samples=1, seed=-1), "seed is -1"),
@@ -104,6 +104,37 @@ def test_a_model_is_a_name_a_hash_a_file_or_its_text(tmp_path):
     assert model_ref("deadbeef00").hash == "deadbeef00"
     assert model_ref(path).yaml == model_ref(str(path)).yaml == "touchstone: model/1\n"
     assert model_ref("touchstone: model/1\nname: a\n").yaml.startswith("touchstone")
+
+
+def test_a_port_alone_is_no_target():
+    with pytest.raises(InvalidRequest, match=r'targets is 50051; "host:port" was expected, for instance "127.0.0.1:50051"'):
+        touchstone.connect(50051)  # type: ignore[arg-type]
+    with pytest.raises(InvalidRequest, match=r'targets is 1.5; .*"127.0.0.1:50051"'):
+        touchstone.Client(1.5)  # type: ignore[arg-type]
+
+
+def test_a_number_is_no_plan():
+    with pytest.raises(InvalidRequest, match=r"plan is 20001; give touchstone.sphere\(...\), faces\(...\) or touches"):
+        touchstone.Client("127.0.0.1:1").plan(20001)  # type: ignore[arg-type]
+
+
+def test_clients_and_datasets_say_what_they_are():
+    client = touchstone.Client("127.0.0.1:1,127.0.0.1:2")
+    assert repr(client) == "Client(127.0.0.1:1, 127.0.0.1:2)"
+    dataset = client.dataset(["lat20", "cup"], samples=10_000, columns=["descriptor", "object"], batch_size=4096)
+    assert repr(dataset) == "Dataset(10000 samples of lat20, cup; descriptor, object; 3 batches of 4096)"
+    part = client.dataset("lat20", samples=10_000, start=100, stop=200, batch_size=50, columns="descriptor")
+    assert repr(part) == "Dataset(10000 samples of lat20, 100 to 200; descriptor; 2 batches of 50)"
+
+
+def test_pictures_of_a_dataset_are_taken_from_where_the_object_shows():
+    def ratio(**arguments):
+        return specification(["a"], samples=1, **arguments).plan.sphere.radius_ratio
+
+    assert ratio() == 1.05
+    assert ratio(image=(64, 64)) == ratio(columns="image") == 2.4
+    assert ratio(image=(64, 64), plan=touchstone.sphere(step_angle_deg=5)) == 2.4
+    assert ratio(image=(64, 64), plan=touchstone.sphere(radius_ratio=1.05)) == 1.05
 
 
 def test_targets_are_checked():

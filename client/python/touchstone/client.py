@@ -21,7 +21,8 @@ from .images import ImageLike, Views, image as default_image, to_image, to_views
 from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .own_server import OwnServer
-from .plans import PlanLike, Touches
+from .plans import PlanLike, Touches, plan_message
+from .printable import printable
 from .retry import RETRY_FOR_S, Retry
 from .rig import Rig
 from .samples import Samples
@@ -76,6 +77,9 @@ class Client(Diagnosis):
         self._description: Description | None = None
         self._leases: list[Lease] = []
         self.rig = Rig(self)
+
+    def __repr__(self) -> str:
+        return printable(f"Client({', '.join(self._connection.targets)})")
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -207,7 +211,7 @@ class Client(Diagnosis):
           model: what the real rig has: its fingers, with its effects, must all meet the object. None: the source's own.
           max_draws: draws for one touch before the plan is refused, with the reason; 0: the source's own limit.
         """
-        message = plan.to_proto()
+        message = plan_message(plan)
         if not isinstance(plan, Touches):
             message.speed_m_s = units.si_value("speed_m_s", checks.positive("speed_mm_s", speed_mm_s))
         request = source_pb2.ExpandPlanRequest(

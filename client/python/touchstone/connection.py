@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import random
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Union
 
 import grpc
@@ -57,6 +57,10 @@ def parse_targets(targets: Targets) -> tuple[str, ...]:
     """("host:port", ...) from one text, "a:1,b:2", or a sequence of them."""
     if isinstance(targets, str):
         targets = targets.split(",")
+    if not isinstance(targets, Iterable):
+        raise errors.InvalidRequest(
+            f'targets is {targets!r}; "host:port" was expected, for instance "127.0.0.1:{targets if isinstance(targets, int) else 50051}".'
+        )
     result = tuple(str(target).strip() for target in targets)
     if not result:
         raise errors.InvalidRequest('No target is given; say for instance "127.0.0.1:50051".')

@@ -14,6 +14,7 @@ import grpc
 from . import checks, errors, images, units
 from .batch import Batch
 from .connection import Connection
+from .printable import printable
 from .retry import Retry
 from .specification import resolve_batch_size
 from .v1 import source_pb2, source_pb2_grpc
@@ -111,6 +112,11 @@ class Dataset:
         self._hold_lease = hold_lease
         self._session = session
         self._header = known_header
+
+    def __repr__(self) -> str:
+        part = "" if (self.start, self.stop) == (0, self.spec.samples) else f", {self.start} to {self.stop}"
+        return printable(f"Dataset({self.spec.samples} samples of {', '.join(self.spec.objects)}{part}; "
+                         f"{', '.join(self.spec.columns)}; {len(self)} batches of {self.batch_size})")
 
     def __len__(self) -> int:
         step = self.batch_size * self.stride

@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 from . import checks, units
 from .errors import InvalidRequest
+from .printable import printable
 from .v1 import source_pb2, types_pb2
+
+RADIUS_RATIO = 1.05
+RADIUS_RATIO_OF_PICTURES = 2.4
+
+
+def plan_message(plan: PlanLike) -> source_pb2.Plan:
+    """The plan as a message; an error says what was given instead of one."""
+    if not hasattr(plan, "to_proto"):
+        raise InvalidRequest(f"plan is {printable(repr(plan))}; give touchstone.sphere(...), faces(...) or touches(...).")
+    return plan.to_proto()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,15 +31,19 @@ class SpherePlan:
 
     step_angle_deg: float
     roll_step_deg: float
-    radius_ratio: float
+    radius_ratio: float | None
     max_incidence_deg: float
+
+    def for_pictures(self) -> SpherePlan:
+        """With a radius from which the whole object shows, where none is given."""
+        return dataclasses.replace(self, radius_ratio=RADIUS_RATIO_OF_PICTURES) if self.radius_ratio is None else self
 
     def to_proto(self) -> source_pb2.Plan:
         return source_pb2.Plan(
             sphere=source_pb2.SpherePlan(
                 step_angle_rad=units.si_value("step_angle_rad", checks.positive("step_angle_deg", self.step_angle_deg)),
                 roll_step_rad=units.si_value("roll_step_rad", checks.number("roll_step_deg", self.roll_step_deg)),
-                radius_ratio=checks.positive("radius_ratio", self.radius_ratio),
+                radius_ratio=checks.positive("radius_ratio", RADIUS_RATIO if self.radius_ratio is None else self.radius_ratio),
                 max_incidence_rad=_incidence_rad(self.max_incidence_deg),
             )
         )
@@ -166,14 +181,15 @@ class Touches:
 PlanLike = Union[SpherePlan, FacesPlan, Touches]
 
 
-def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float = 1.05,
+def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float | None = None,
            max_incidence_deg: float = 90.0) -> SpherePlan:
     """Random approaches from a sphere round the object towards its centre; drawn again until every finger hits.
 
     Args:
       step_angle_deg: both angles of the start are multiples of it; above 0, at most 90.
       roll_step_deg: the hand turns about the approach by a random multiple of it; 0: no turn.
-      radius_ratio: radius of the sphere over half the diagonal of the bounding box, at least 1.
+      radius_ratio: radius of the sphere over half the diagonal of the bounding box, at least 1. Default: 1.05; of a dataset
+        with images 2.4, from where the whole object shows (the camera stands where the touch begins).
       max_incidence_deg: largest angle at which a finger meets the surface, 0 being square on; 90: any.
     """
     return SpherePlan(step_angle_deg, roll_step_deg, radius_ratio, max_incidence_deg)

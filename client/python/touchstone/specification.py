@@ -10,7 +10,7 @@ from . import checks, units
 from .errors import InvalidRequest
 from .images import ImageLike, image as default_image, to_image
 from .models import ModelLike, model_ref
-from .plans import FacesPlan, PlanLike, SpherePlan, Touches, sphere
+from .plans import FacesPlan, PlanLike, SpherePlan, Touches, plan_message, sphere
 from .v1 import source_pb2
 
 # Default samples per batch: enough to make a message's overhead small, and a few MB with images.
@@ -47,10 +47,9 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
     if not objects or not checks.is_sequence_of_text(objects):
         raise InvalidRequest(f"objects is {objects!r}; give at least one object's name.")
     plan = sphere() if plan is None else plan
-    if not hasattr(plan, "to_proto"):
-        raise InvalidRequest(
-            f"plan is {type(plan).__name__}; give touchstone.sphere(...), faces(...) or touches(...)."
-        )
+    if isinstance(plan, SpherePlan) and (image is not None or "image" in (columns or ())):
+        plan = plan.for_pictures()
+    message = plan_message(plan)
     # The size: a plan with an end has one of its own.
     if samples is None:
         if isinstance(plan, SpherePlan):
@@ -60,7 +59,6 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
         samples = plan.samples(len(objects))
     _warn_of_faces_without_touches(plan, samples, len(objects))
     # The speed: explicit touches carry their own.
-    message = plan.to_proto()
     if isinstance(plan, Touches):
         if speed_mm_s is not None:
             raise InvalidRequest("speed_mm_s is given, but explicit touches carry their own; set it there.")
