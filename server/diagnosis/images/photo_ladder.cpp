@@ -98,17 +98,11 @@ class PhotoLadder {
   }
 
   absl::Status DescribeSteps() {
-    const engine::Experiment& experiment = *selection_.fine.experiment;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::OrderedStep> ordered,
-                                engine::OrderSteps(experiment, {fit_, selection_.initial_effects},
-                                                   selection_.field, selection_.steps));
-    for (const engine::OrderedStep& step : ordered) {
-      double heldout_ratio = selection_.heldout_ratio;
-      if (!step.whole) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(heldout_ratio, HeldOutRatio(*selection_.photographs,
-                                                                *selection_.fine.rows, experiment, step.fit));
-      }
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*step.step, step.whole ? values_ : step.fit, heldout_ratio));
+    for (const PhotoRung& rung : selection_.rungs) {
+      const auto step = std::find_if(selection_.steps.begin(), selection_.steps.end(),
+                                     [&](const auto& other) { return other.effect == rung.effect; });
+      if (step != selection_.steps.end())
+        TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*step, rung.fit, rung.heldout_ratio));
     }
     return absl::OkStatus();
   }
@@ -185,7 +179,7 @@ class PhotoLadder {
   // A structure that no named effect explains.
   absl::Status AssessRest() {
     const engine::Likelihood& likelihood = *selection_.fine.likelihood;
-    const double q = likelihood.Gram(engine::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
+    const double q = likelihood.Gram(likelihood.Prepare(fit_.columns.values.col(0)), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
     const double p = ChiSquaredTail(q, freedom);
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);

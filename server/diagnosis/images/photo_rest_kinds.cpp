@@ -14,14 +14,15 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kBlockPx = 16;                    // side of a block of a picture
-constexpr int kKindFolds = 5;                       // of the poses
-constexpr int kKindMapSide = 14, kKindPlaceSide = 6;    // cells of a picture and of an object's box, along a side
-constexpr double kMaxFewShare = 0.1;            // of the pictures, that are a few
-constexpr double kMinFewShare = 0.5;            // of the excess, that they hold
-constexpr double kKindShrinkage = 20;               // pixels' worth of a prior at no change, of a cell
-constexpr int kPlaceColumns = 4;                // right, down, and each growing from row to row
-constexpr double kShear = 0.5;                  // of a displacement, that grows from row to row: a shutter
+constexpr int kBlockPx = 16;   // side of a block of a picture
+constexpr int kKindFolds = 5;  // of the poses
+constexpr int kKindMapSide = 14,
+              kKindPlaceSide = 6;      // cells of a picture and of an object's box, along a side
+constexpr double kMaxFewShare = 0.1;   // of the pictures, that are a few
+constexpr double kMinFewShare = 0.5;   // of the excess, that they hold
+constexpr double kKindShrinkage = 20;  // pixels' worth of a prior at no change, of a cell
+constexpr int kPlaceColumns = 4;       // right, down, and each growing from row to row
+constexpr double kShear = 0.5;         // of a displacement, that grows from row to row: a shutter
 
 // Sums of a least-squares fit of a few columns to residuals.
 template <int kColumns>
@@ -136,17 +137,18 @@ class RestKinds {
                      down = 0.5 * (near(x, y - 1) - near(x, y + 1)), v = 2 * (y + 0.5) / height - 1;
         if (right != 0 || down != 0)
           sums.place[half].Add(Eigen::Vector4d(right, down, right * v, down * v), residual);
-        const double bend =
-            near(x - 1, y) + near(x + 1, y) + near(x, y - 1) + near(x, y + 1) - 4 * expected;
+        const double bend = near(x - 1, y) + near(x + 1, y) + near(x, y - 1) + near(x, y + 1) - 4 * expected;
         if (bend != 0) sums.contours.Add(Eigen::Matrix<double, 1, 1>(bend), residual);
-        sums.in_picture.Add(static_cast<size_t>(y * kKindMapSide / height * kKindMapSide + x * kKindMapSide / width),
-                            expected, residual);
+        sums.in_picture.Add(
+            static_cast<size_t>(y * kKindMapSide / height * kKindMapSide + x * kKindMapSide / width),
+            expected, residual);
         if (photo.mask[at] == 0) continue;
         size_t place = 0;
         for (int axis = 0; axis < 3; ++axis) {
           const double extent = std::max(bounds.max_m[axis] - bounds.min_m[axis], 1e-9);
           const double share = (photo.point_m[at][axis] - bounds.min_m[axis]) / extent;
-          place = place * kKindPlaceSide + std::clamp(static_cast<int>(share * kKindPlaceSide), 0, kKindPlaceSide - 1);
+          place = place * kKindPlaceSide +
+                  std::clamp(static_cast<int>(share * kKindPlaceSide), 0, kKindPlaceSide - 1);
         }
         sums.on_object.Add(place, expected, residual);
       }
@@ -205,19 +207,20 @@ class RestKinds {
     const double share = Share(taken), even_px = std::sqrt(even / p_.size()),
                  growing_px = 2 * std::sqrt(growing / p_.size());
     const bool shutter = growing_px > kShear * even_px;
-    return {RestKind::kPlaceOfPicture, share,
-            absl::StrCat(
-                absl::StrFormat("It differs from picture to picture: a displacement of each picture's own "
-                                "(%.2g px%s) takes %.0f %% of it. ",
-                                even_px,
-                                shutter ? absl::StrFormat(", and %.2g px from the top row to the bottom one",
-                                                          growing_px)
-                                        : "",
-                                100 * share),
-                shutter ? "The camera moves while its rows are read (rolling shutter). Let the arm stand still "
-                          "before each picture."
-                        : "Poses are off by an amount of their own, or the camera moves. Photograph one pose "
-                          "several times, coming from other sides.")};
+    return {
+        RestKind::kPlaceOfPicture, share,
+        absl::StrCat(
+            absl::StrFormat(
+                "It differs from picture to picture: a displacement of each picture's own "
+                "(%.2g px%s) takes %.0f %% of it. ",
+                even_px,
+                shutter ? absl::StrFormat(", and %.2g px from the top row to the bottom one", growing_px)
+                        : "",
+                100 * share),
+            shutter ? "The camera moves while its rows are read (rolling shutter). Let the arm stand still "
+                      "before each picture."
+                    : "Poses are off by an amount of their own, or the camera moves. Photograph one pose "
+                      "several times, coming from other sides.")};
   }
 
   KindOfRest InPicture() const {

@@ -167,9 +167,9 @@ PixelNoise NoiseGatherer::Estimate() const {
     const size_t at = static_cast<size_t>(bin) * kSteps;
     const double count = std::accumulate(&counts_[at], &counts_[at] + kSteps, 0.0);
     if (count < kMinCount) continue;
-    levels.push_back(
-        {(bin + 0.5) * kBinGrey,
-         std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance), count});
+    levels.push_back({(bin + 0.5) * kBinGrey,
+                      std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance),
+                      count});
   }
   // variance = sigma^2 + gain * grey over the levels, each weighed by count / variance^2.
   std::vector<double> grey, variance, weight;
