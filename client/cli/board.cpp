@@ -11,6 +11,7 @@
 #include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
+#include "server/session/camera_yaml.h"
 
 namespace touchstone::cli {
 namespace {
@@ -42,6 +43,16 @@ absl::StatusOr<model::Model> NominalLensModel(const std::string& file) {
   return model::ParseModel(text, file, effects::Catalogue(), model::FilesBeside(file));
 }
 
+absl::Status SaveCamera(const Cli& cli, const std::string& file, const boards::BoardDiagnosis& diagnosis) {
+  if (!diagnosis.lens) {
+    cli.Log("--save-camera: these pictures give no lens; no file is written");
+    return absl::OkStatus();
+  }
+  TOUCHSTONE_RETURN_IF_ERROR(cli.Write(file, session::FormatCameraYaml(diagnosis.lens->camera)));
+  cli.LogWritten(file, " (camera.yaml of the lens with all steps)");
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 void AddBoardOptions(CLI::App* command, BoardOptions* options) {
@@ -71,6 +82,7 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   v1::Report report = diagnosis::report::ToReport(diagnosis::report::FromBoards(diagnosis, set));
   AddClientProvenance(cli.command_line(), "", {}, &report);
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
+  if (!board.save_camera.empty()) TOUCHSTONE_RETURN_IF_ERROR(SaveCamera(cli, board.save_camera, diagnosis));
   if (save_model.empty()) return absl::OkStatus();
   model::Model improved = model;
   if (diagnosis.improved_model) {

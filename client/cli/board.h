@@ -8,8 +8,9 @@
 namespace touchstone::cli {
 
 struct BoardOptions {
-  std::string corners;   // "9x6"; empty: the set is none of boards
-  double square_mm = 0;  // must be given with it
+  std::string corners;      // "9x6"; empty: the set is none of boards
+  double square_mm = 0;     // must be given with it
+  std::string save_camera;  // file; empty: the lens is not written
 };
 
 void AddBoardOptions(CLI::App* command, BoardOptions* options);

@@ -56,7 +56,7 @@ TEST_F(BoardCommand, RealPicturesNameRadialDistortionInPixels) {
   if (!fs::exists(Chessboards())) GTEST_SKIP() << Chessboards() << " is not there";
   if (kUnderSanitizers) GTEST_SKIP() << "diagnosis_boards_test runs the same search";
   const Outcome outcome = Run({"diagnose", Chessboards(), "--board", "9x6", "--square-mm", "25", "--json",
-                               "report.json", "--save-model", "lens.yaml"});
+                               "report.json", "--save-model", "lens.yaml", "--save-camera", "camera.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("Reprojection error"), HasSubstr("+ radial_distortion"),
                                  HasSubstr("px a coordinate)")));
@@ -79,6 +79,14 @@ TEST_F(BoardCommand, RealPicturesNameRadialDistortionInPixels) {
   // What the fits of poses and lens take away is less than a tenth.
   EXPECT_NEAR(data["noise_floor"].get<double>(), px("final", "rmse"), 0.1 * px("final", "rmse"));
   EXPECT_THAT(Read("lens.yaml"), HasSubstr("radial_distortion"));
+  // The lens in pixels: in words, in the report and as a file.
+  EXPECT_THAT(outcome.out, HasSubstr("The lens: fx "));
+  const double fx_px = data["lens"]["fx_px"].get<double>();
+  EXPECT_NEAR(fx_px, 535, 10);
+  EXPECT_GT(data["lens"]["fx_std_error_px"].get<double>(), 0);
+  EXPECT_NEAR(data["lens"]["k1"].get<double>(), kOpenCvK1, 0.02);
+  EXPECT_THAT(Read("camera.yaml"),
+              AllOf(HasSubstr("width_px: 640"), HasSubstr("fx_px: 53"), HasSubstr("k1: -0.2")));
 }
 
 TEST_F(BoardCommand, TooFewBoardsGiveNoVerdictAndNoErrors) {
@@ -97,6 +105,22 @@ TEST_F(BoardCommand, TooFewBoardsGiveNoVerdictAndNoErrors) {
   const Outcome none = Run({"diagnose", "two", "--board", "10x7", "--square-mm", "25"});
   EXPECT_EQ(none.exit_code, 0) << none.err;
   EXPECT_THAT(none.out, AllOf(HasSubstr("found in 0 pictures"), HasSubstr("Is 10x7 the number of its")));
+}
+
+TEST_F(BoardCommand, OnePictureSixTimesGivesNoLens) {
+  if (!fs::exists(Chessboards())) GTEST_SKIP() << Chessboards() << " is not there";
+  CopyBoards("one", 1);
+  const fs::path picture = fs::directory_iterator(Path("one"))->path();
+  for (int copy = 0; copy < 5; ++copy)
+    fs::copy_file(picture, fs::path(Path("one")) / ("copy" + std::to_string(copy) + ".jpg"));
+  const Outcome outcome = Run({"diagnose", "one", "--board", "9x6", "--square-mm", "25", "--json", "one.json",
+                               "--save-camera", "camera.yaml"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json report = nlohmann::json::parse(Read("one.json"), nullptr, false);
+  EXPECT_EQ(report["verdict"], "TOO_LITTLE_DATA");
+  EXPECT_TRUE(report["steps"].empty());
+  EXPECT_THAT(outcome.out, HasSubstr("the same picture as another, counted once"));
+  EXPECT_FALSE(fs::exists(Path("camera.yaml")));
 }
 
 TEST_F(BoardCommand, WhatCannotBeIsRefusedByName) {

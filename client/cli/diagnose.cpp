@@ -70,6 +70,9 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
             absl::StrCat(name, ": is not for pictures of a board (--board); leave it out"));
     return RunBoardDiagnosis(cli, options, options.board, options.save_model);
   }
+  if (!options.board.save_camera.empty())
+    return absl::InvalidArgumentError(
+        "--save-camera: the lens of what board? Give --board, for instance 9x6, and --square-mm");
   if (options.board.square_mm != 0)
     return absl::InvalidArgumentError(
         "--square-mm: the side of a square of what board? Give --board, for instance 9x6");
@@ -122,6 +125,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
       "touchstone diagnose photos --model nominal.yaml --mesh-dir meshes --html report.html\n"
       "touchstone diagnose photos --board 9x6 --square-mm 25 --save-model lens.yaml\n"
+      "touchstone diagnose photos --board 9x6 --square-mm 25 --save-camera camera.yaml\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
@@ -134,6 +138,8 @@ void AddDiagnose(Cli* cli) {
       "With --save-model: where the surfaces depart from their meshes, write a map of them beside "
       "the model (FILE's name with .surface.csv), which the model then applies");
   AddBoardOptions(command, &options->board);
+  cli->AddOutput(command, "--save-camera", &options->board.save_camera,
+                 "With --board: write the lens with all that was found as a camera.yaml");
   command
       ->add_option("--keep-as", options->keep_as,
                    "With --server: keep the improved model there under this name, served at once")

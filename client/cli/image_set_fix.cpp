@@ -48,6 +48,24 @@ absl::Status ReadUp(const std::string& text, session::ImageSetFix* fix) {
   return absl::OkStatus();
 }
 
+absl::Status ReadExchange(const std::string& text, session::ImageSetFix* fix) {
+  if (text.empty()) return absl::OkStatus();
+  const std::vector<std::string> images = absl::StrSplit(text, ',');
+  uint64_t one = 0, other = 0;
+  if (images.size() != 2 || !absl::SimpleAtoi(images[0], &one) || !absl::SimpleAtoi(images[1], &other))
+    return BadValue("--exchange", text, "the numbers of two images (3,5) was");
+  fix->exchange = {one, other};
+  return absl::OkStatus();
+}
+
+absl::Status ReadDrop(const std::string& text, session::ImageSetFix* fix) {
+  if (text.empty()) return absl::OkStatus();
+  for (const std::string& image : std::vector<std::string>(absl::StrSplit(text, ',')))
+    if (!absl::SimpleAtoi(image, &fix->drop.emplace_back()))
+      return BadValue("--drop-images", image, "an image's number was");
+  return absl::OkStatus();
+}
+
 absl::Status ReadImageFix(const ImageSetFixOptions& options, session::ImageSetFix* fix) {
   TOUCHSTONE_RETURN_IF_ERROR(ReadImageNumbers(options.images, fix));
   TOUCHSTONE_RETURN_IF_ERROR(ReadUp(options.up, fix));
@@ -67,6 +85,9 @@ absl::Status ReadImageFix(const ImageSetFixOptions& options, session::ImageSetFi
       return BadValue(option, ShortestNumber(factor), "a factor above 0 was");
   fix->swap_channels = options.swap_channels;
   fix->swap_eye_at = options.swap_eye_at;
+  fix->reverse_up = options.reverse_up;
+  TOUCHSTONE_RETURN_IF_ERROR(ReadExchange(options.exchange, fix));
+  TOUCHSTONE_RETURN_IF_ERROR(ReadDrop(options.drop, fix));
   fix->scale_camera = options.scale_camera;
   fix->scale_focal = options.focal_factor;
   if (fix->empty())
@@ -103,6 +124,15 @@ void AddImageSetFixOptions(CLI::App* command, ImageSetFixOptions* options) {
       ->type_name("F")
       ->group(group);
   command->add_flag("--swap-eye-at", options->swap_eye_at, "Exchange eye and at")->group(group);
+  command->add_flag("--reverse-up", options->reverse_up, "Turn up around in every picture")->group(group);
+  command->add_option("--drop-images", options->drop, "Leave these pictures out, by their numbers")
+      ->type_name("A,B,...")
+      ->group(group);
+  command
+      ->add_option("--exchange", options->exchange,
+                   "Exchange two pictures, by their numbers: each gets the other's row")
+      ->type_name("A,B")
+      ->group(group);
   command->add_option("--up", options->up, "The camera's up in every picture")
       ->type_name("X,Y,Z")
       ->group(group);

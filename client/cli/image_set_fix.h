@@ -11,11 +11,11 @@ namespace touchstone::cli {
 // What only photographs need, as it stands on the command line.
 struct ImageSetFixOptions {
   static constexpr const char* kNames[] = {
-      "--images",       "--rotate",       "--mirror",      "--swap-channels",
-      "--scale-camera", "--focal-factor", "--swap-eye-at", "--up"};
-  std::string images, mirror, up;
+      "--images",      "--rotate", "--mirror",     "--swap-channels", "--scale-camera", "--focal-factor",
+      "--swap-eye-at", "--up",     "--reverse-up", "--exchange",      "--drop-images"};
+  std::string images, mirror, up, exchange, drop;
   int rotate_deg = 0;
-  bool swap_channels = false, swap_eye_at = false;
+  bool swap_channels = false, swap_eye_at = false, reverse_up = false;
   double scale_camera = 1, focal_factor = 1;
 };
 

@@ -60,6 +60,8 @@
   EFFECT(MotionBlur)                     \
   EFFECT(Exposure)                       \
   EFFECT(Gamma)                          \
+  EFFECT(Response)                       \
+  EFFECT(BlackLevel)                     \
   EFFECT(ImageNoise)
 
 // Of any stage.

@@ -10,8 +10,15 @@ struct Parameters {
 };
 
 constexpr ParameterRow<Parameters> kRows[] = {
-    {&Parameters::level, "level", Unit::kNone, -0.07, 2, 0, 0.05,
-     "Added to the ambient term of the shade, in units of white; the nominal term is 0.07."},
+    {.field = &Parameters::level,
+     .name = "level",
+     .unit = Unit::kNone,
+     .lower = -0.07,
+     .upper = 2,
+     .neutral = 0,
+     .typical = 0.05,
+     .meaning = "Added to the ambient term of the shade, in units of white; the nominal term is 0.07.",
+     .least_claimed = 0},
 };
 
 void Apply(const Parameters& p, PhotoSettings& photo) {

@@ -248,17 +248,17 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, EffectContract, testing::ValuesIn(TouchEffec
 TEST(Catalogue, HasTheEffectsOfTheDesignInItsOrder) {
   std::vector<std::string> names;
   for (const auto& effect : Catalogue().All()) names.push_back(effect->name);
-  EXPECT_THAT(
-      names, testing::ElementsAre("tool_yaw", "tool_tilt", "finger_spacing", "finger_length", "gravity_sag",
-                                  "object_scale", "object_pose", "tip_radius", "surface_error", "surface_map",
-                                  "speed_error", "acceleration_ramp", "contact_slowdown", "object_push",
-                                  "oblique_slip", "channel_latency", "thermal_drift", "return_hysteresis",
-                                  "clock_skew", "poll_interval", "gaussian_noise", "incidence_noise",
-                                  "heavy_tail_noise", "missed_contact", "correlated_noise", "position_noise",
-                                  "finger_noise", "camera_translation", "camera_rotation", "focal_error",
-                                  "principal_point", "radial_distortion", "light_position", "ambient_light",
-                                  "specular", "cast_shadow", "background_level", "vignetting", "defocus_blur",
-                                  "motion_blur", "exposure", "gamma", "image_noise", "formula", "lookup"));
+  EXPECT_THAT(names,
+              testing::ElementsAre(
+                  "tool_yaw", "tool_tilt", "finger_spacing", "finger_length", "gravity_sag", "object_scale",
+                  "object_pose", "tip_radius", "surface_error", "surface_map", "speed_error",
+                  "acceleration_ramp", "contact_slowdown", "object_push", "oblique_slip", "channel_latency",
+                  "thermal_drift", "return_hysteresis", "clock_skew", "poll_interval", "gaussian_noise",
+                  "incidence_noise", "heavy_tail_noise", "missed_contact", "correlated_noise",
+                  "position_noise", "finger_noise", "camera_translation", "camera_rotation", "focal_error",
+                  "principal_point", "radial_distortion", "light_position", "ambient_light", "specular",
+                  "cast_shadow", "background_level", "vignetting", "defocus_blur", "motion_blur", "exposure",
+                  "gamma", "response", "black_level", "image_noise", "formula", "lookup"));
 }
 
 TEST(Catalogue, ListsStagesInTheOrderOfTheDataAndOnlyTipRadiusBeforeTheCast) {

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include <absl/strings/str_split.h>
 #include <absl/types/span.h>
 #include <Eigen/Core>
 
@@ -34,9 +36,11 @@ struct ParameterRow {
   double neutral;  // changes nothing; the default
   double typical;  // the size that rigs show
   const char* meaning;
-  bool sum_zero = false;    // per finger: only differences can be seen, so the values sum to 0
-  bool reciprocal = false;  // the response is smooth in 1 / value, and infinity stands for "none"
-  double usual = 0;         // the largest magnitude that rigs show; 0: up to the bounds
+  bool sum_zero = false;     // per finger: only differences can be seen, so the values sum to 0
+  bool reciprocal = false;   // the response is smooth in 1 / value, and infinity stands for "none"
+  double usual = 0;          // the largest magnitude that rigs show; 0: up to the bounds
+  const char* choices = "";  // ParameterInfo::choices, with commas between
+  double least_claimed = -INFINITY;
 };
 
 template <typename P>
@@ -118,6 +122,8 @@ model::Effect DefineEffect(const EffectDefinition<P>& definition) {
     info.sum_zero = row.sum_zero;
     info.reciprocal = row.reciprocal;
     info.meaning = row.meaning;
+    info.least_claimed = row.least_claimed;
+    if (*row.choices != 0) info.choices = absl::StrSplit(row.choices, ',');
     effect.parameters.push_back(std::move(info));
   }
   // The span points to the static rows of the effect's file.

@@ -30,6 +30,7 @@ PhotoSettings SomeSettings() {
   settings.motion_length_px = 2, settings.motion_angle_rad = 0.3;
   settings.exposure_factor = 1.3;
   settings.gamma = 0.8;
+  settings.black_level_grey = 3;
   settings.noise_sigma_grey = 1.5, settings.noise_gain = 0.02;
   return settings;
 }
@@ -48,9 +49,9 @@ std::set<model::Stage> ChangedStages(const PhotoSettings& a, const PhotoSettings
     stages.insert(model::Stage::kShading);
   if (a.vignetting != b.vignetting || a.defocus_sigma_px != b.defocus_sigma_px ||
       a.motion_length_px != b.motion_length_px || a.motion_angle_rad != b.motion_angle_rad ||
-      a.exposure_factor != b.exposure_factor || a.gamma != b.gamma ||
-      a.added_grey.size() != b.added_grey.size() || a.noise_sigma_grey != b.noise_sigma_grey ||
-      a.noise_gain != b.noise_gain)
+      a.exposure_factor != b.exposure_factor || a.gamma != b.gamma || a.srgb_share != b.srgb_share ||
+      a.black_level_grey != b.black_level_grey || a.added_grey.size() != b.added_grey.size() ||
+      a.noise_sigma_grey != b.noise_sigma_grey || a.noise_gain != b.noise_gain)
     stages.insert(model::Stage::kImageSensor);
   return stages;
 }
@@ -144,11 +145,11 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, PhotoEffectContract, testing::ValuesIn(Built
 TEST(PhotoCatalogue, HasTheEffectsOfTheDesignInItsOrder) {
   std::vector<std::string> names;
   for (const auto& effect : BuiltInPhotoEffects()) names.push_back(effect->name);
-  EXPECT_THAT(names,
-              testing::ElementsAre("camera_translation", "camera_rotation", "focal_error", "principal_point",
-                                   "radial_distortion", "light_position", "ambient_light", "specular",
-                                   "cast_shadow", "background_level", "vignetting", "defocus_blur",
-                                   "motion_blur", "exposure", "gamma", "image_noise"));
+  EXPECT_THAT(names, testing::ElementsAre("camera_translation", "camera_rotation", "focal_error",
+                                          "principal_point", "radial_distortion", "light_position",
+                                          "ambient_light", "specular", "cast_shadow", "background_level",
+                                          "vignetting", "defocus_blur", "motion_blur", "exposure", "gamma",
+                                          "response", "black_level", "image_noise"));
 }
 
 }  // namespace

@@ -49,6 +49,8 @@ struct PhotoSettings {
   double motion_length_px = 0, motion_angle_rad = 0;  // box along a direction; 0: right, pi / 2: up
   double exposure_factor = 1;                         // of the light, which is then clipped at white
   double gamma = 1;                                   // recorded = light ^ gamma
+  double srgb_share = 0;        // 1: then sRGB's curve of it; between 0 and 1, in fits alone, a mean of both
+  double black_level_grey = 0;  // added to what is recorded, up to white
   // Formulas and lookups: each adds grey levels to a recorded pixel; the result is clipped to 0 to 255.
   std::vector<std::function<double(const PhotoPixel&)>> added_grey;
   double noise_sigma_grey = 0, noise_gain = 0;  // variance sigma^2 + gain * grey, before rounding to 8 bits

@@ -120,6 +120,21 @@ void ExposeAndRespond(double exposure_factor, double gamma, std::vector<float>* 
   }
 }
 
+float SrgbOf(float light) {
+  return light <= 0.0031308f ? 12.92f * light : 1.055f * PowerOf(light, 1 / 2.4f) - 0.055f;
+}
+
+// sRGB's curve, or a mean of it and none, of recorded grey levels.
+void WriteSrgb(double share, std::vector<float>* grey) {
+  const float white = static_cast<float>(kFloatGrey), part = static_cast<float>(share);
+  for (float& value : *grey) value += part * (white * SrgbOf(value / white) - value);
+}
+
+void AddPedestal(double black_level_grey, std::vector<float>* grey) {
+  const float white = static_cast<float>(kFloatGrey), pedestal = static_cast<float>(black_level_grey);
+  for (float& value : *grey) value = std::min(value + pedestal, white);
+}
+
 absl::Status AddTerms(const effects::PhotoSettings& settings, const PhotoLens& lens,
                       const PixelSurface& surface, double session_time_s, std::vector<float>* grey) {
   const double half_diagonal_px = 0.5 * std::hypot(lens.width, lens.height);
@@ -194,6 +209,8 @@ absl::Status RecordLight(const effects::PhotoSettings& settings, const PhotoLens
   if (settings.motion_length_px > 0)
     MoveDuringExposure(settings.motion_length_px, settings.motion_angle_rad, lens, light);
   ExposeAndRespond(settings.exposure_factor, settings.gamma, light);
+  if (settings.srgb_share > 0) WriteSrgb(settings.srgb_share, light);
+  if (settings.black_level_grey > 0) AddPedestal(settings.black_level_grey, light);
   if (settings.added_grey.empty()) return absl::OkStatus();
   return AddTerms(settings, lens, surface, session_time_s, light);
 }

@@ -56,6 +56,24 @@ TEST_F(PhotoSensor, GammaIsAPowerOfExposedLight) {
   }
 }
 
+TEST_F(PhotoSensor, ResponseIsTheCurveOfSrgb) {
+  const Photo linear = Nominal(), photo = MustPhotograph({{"response", {"curve=srgb"}}}, request_);
+  for (size_t i = 0; i < photo.grey.size(); ++i) {
+    const double light = linear.grey[i] / 255;
+    const double recorded = light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+    EXPECT_NEAR(photo.grey[i], 255 * recorded, 2e-3);
+  }
+}
+
+TEST_F(PhotoSensor, BlackLevelIsAddedUpToWhite) {
+  const EffectLines bright = {{"exposure", {"stops=2"}}};
+  EffectLines lines = bright;
+  lines.push_back({"black_level", {"grey=12"}});
+  const Photo plain = MustPhotograph(bright, request_), photo = MustPhotograph(lines, request_);
+  for (size_t i = 0; i < photo.grey.size(); ++i)
+    EXPECT_NEAR(photo.grey[i], std::min(plain.grey[i] + 12.0, 255.0), 1e-3);
+}
+
 TEST(PhotoPower, IsThePowerToAMillionth) {
   double worst = 0;
   for (double x = 1e-12; x <= 1.0; x *= 1.0137)

@@ -59,8 +59,11 @@ struct ParameterInfo {
   // the set-up.
   double usual_lower = -INFINITY;
   double usual_upper = INFINITY;
+  double least_claimed = -INFINITY;  // less is simulated, and is no cause that a diagnosis adds
   bool sum_zero = false;  // per finger: only differences between fingers can be seen, so the values sum to 0
   bool reciprocal = false;  // the response is smooth in 1 / value: a fit moves that, and "none" is infinity
+  // Names of the values 0, 1, ..., which files write; other values are those of fits alone. Empty: any number.
+  std::vector<std::string> choices = {};
   std::string meaning;
 
   int Count(int fingers) const {

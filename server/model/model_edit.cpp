@@ -38,12 +38,13 @@ absl::StatusOr<std::vector<Assignment>> Split(const std::vector<std::string>& te
 }
 
 // "1.5", "0.25,0,-0.25" or "[0.25, 0, -0.25]".
-absl::StatusOr<std::vector<double>> Numbers(const std::string& what, absl::string_view text) {
+absl::StatusOr<std::vector<double>> Numbers(const std::string& what, const ParameterInfo& parameter,
+                                            absl::string_view text) {
   if (absl::ConsumePrefix(&text, "[") && !absl::ConsumeSuffix(&text, "]"))
     return absl::InvalidArgumentError(absl::StrCat(what, ": ']' is missing at the end of '[", text, "'"));
   std::vector<double> numbers;
   for (const absl::string_view part : absl::StrSplit(text, ',')) {
-    const absl::StatusOr<double> number = ParseNumber(absl::StripAsciiWhitespace(part));
+    const absl::StatusOr<double> number = NumberFromText(parameter, absl::StripAsciiWhitespace(part));
     if (!number.ok()) return absl::InvalidArgumentError(absl::StrCat(what, ": ", number.status().message()));
     numbers.push_back(*number);
   }
@@ -54,7 +55,8 @@ absl::Status SetParameter(const Effect& effect, const std::string& name, const s
                           std::vector<double>* values) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const int index, FindParameter(effect, name));
   const std::string what = absl::StrCat(effect.formula ? effect.formula->name : effect.name, ".", name);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> numbers, Numbers(what, text));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> numbers,
+                              Numbers(what, effect.parameters[index], text));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> values_si,
                               ValuesFromFile(what, effect.parameters[index], numbers, fingers));
   std::copy(values_si.begin(), values_si.end(), values->begin() + ValueOffset(effect, index, fingers));
@@ -111,7 +113,7 @@ absl::StatusOr<std::shared_ptr<const Effect>> LookupFrom(const std::vector<Assig
     else if (key == "covariate")
       fields.covariate = value;
     else {
-      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> numbers, Numbers("lookup." + key, value));
+      TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> numbers, Numbers("lookup." + key, {}, value));
       if (key == "knots")
         fields.knots = std::move(numbers);
       else

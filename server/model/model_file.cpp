@@ -90,10 +90,11 @@ class ModelReader {
     return node.text;
   }
 
-  absl::StatusOr<double> Number(const YamlNode& node, absl::string_view what) const {
+  absl::StatusOr<double> Number(const YamlNode& node, absl::string_view what,
+                                const ParameterInfo& parameter = {}) const {
     if (node.kind != Kind::kScalar)
       return Error(node, absl::StrCat(what, " is ", node.KindInWords(), "; it must be a number"));
-    absl::StatusOr<double> value = ParseNumber(node.text);
+    absl::StatusOr<double> value = NumberFromText(parameter, node.text);
     if (!value.ok()) return Error(node, absl::StrCat(what, ": ", value.status().message()));
     return value;
   }
@@ -165,7 +166,7 @@ class ModelReader {
       // A list for vectors and per-finger values, a single number else.
       std::vector<double> numbers;
       if (parameter.arity == Arity::kScalar) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const double number, Number(node, what));
+        TOUCHSTONE_ASSIGN_OR_RETURN(const double number, Number(node, what, parameter));
         numbers.push_back(number);
       } else {
         TOUCHSTONE_RETURN_IF_ERROR(Want(node, Kind::kSequence, what, "[0, 0, 0]"));

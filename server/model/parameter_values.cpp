@@ -4,6 +4,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/base/status.h"
@@ -32,6 +33,10 @@ std::string ShortList(const std::vector<double>& values) {
 }  // namespace
 
 std::string FileNumbers(const ParameterInfo& parameter, absl::Span<const double> values_si) {
+  if (!parameter.choices.empty()) {
+    const double last = static_cast<double>(parameter.choices.size()) - 1;
+    return parameter.choices[static_cast<size_t>(std::clamp(std::round(values_si.at(0)), 0.0, last))];
+  }
   if (parameter.arity == Arity::kScalar) return FileNumber(parameter.unit, values_si.at(0));
   return absl::StrCat("[",
                       absl::StrJoin(values_si, ", ",
@@ -79,6 +84,16 @@ absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, cons
         what, sum, ShortList(centred)));
   }
   return values_si;
+}
+
+absl::StatusOr<double> NumberFromText(const ParameterInfo& parameter, absl::string_view text) {
+  const absl::StatusOr<double> number = ParseNumber(text);
+  if (parameter.choices.empty()) return number;
+  for (size_t choice = 0; choice < parameter.choices.size(); ++choice)
+    if (text == parameter.choices[choice] || (number.ok() && *number == static_cast<double>(choice)))
+      return static_cast<double>(choice);
+  return absl::InvalidArgumentError(
+      absl::StrCat("'", text, "' is none of ", absl::StrJoin(parameter.choices, ", ")));
 }
 
 absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name) {

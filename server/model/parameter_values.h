@@ -25,6 +25,9 @@ int ValueOffset(const Effect& effect, int index, int fingers);
 absl::StatusOr<std::vector<double>> ValuesFromFile(const std::string& what, const ParameterInfo& parameter,
                                                    const std::vector<double>& file_values, int fingers);
 
+// A number as a file has it, or the name of a choice. The error says which choices there are.
+absl::StatusOr<double> NumberFromText(const ParameterInfo& parameter, absl::string_view text);
+
 // The index of a parameter; an error that proposes one if there is none.
 absl::StatusOr<int> FindParameter(const Effect& effect, const std::string& name);
 

@@ -23,6 +23,17 @@ bool IsTurned(int rotate_deg) {
 }
 
 absl::Status CheckImageFix(const ImageSetFix& fix, const ImageSet& set) {
+  std::vector<uint64_t> named = fix.drop;
+  if (fix.exchange) named.insert(named.end(), {fix.exchange->first, fix.exchange->second});
+  for (const uint64_t image : named)
+    if (std::none_of(set.photographs.begin(), set.photographs.end(),
+                     [&](const PhotographRow& row) { return row.image == image; }))
+      return RefusedImages(set, absl::StrCat("has no image ", image));
+  if (fix.exchange && fix.exchange->first == fix.exchange->second)
+    return RefusedImages(set, "two different images were expected to be exchanged");
+  if (fix.exchange && !fix.drop.empty())
+    return RefusedImages(set, "pictures are exchanged or dropped, one after the other");
+  if (fix.drop.size() >= set.size()) return RefusedImages(set, "no picture would be left");
   if (fix.rotate_deg % 90 != 0 || fix.rotate_deg < 0 || fix.rotate_deg > 270)
     return RefusedImages(set,
                          absl::StrCat("pictures turn by 90, 180 or 270 degrees, not by ", fix.rotate_deg));
@@ -38,8 +49,8 @@ absl::Status CheckImageFix(const ImageSetFix& fix, const ImageSet& set) {
     return RefusedImages(
         set, absl::StrCat("has ", set.size(), " rows; they cannot be shifted by ", fix.shift_rows));
   if (!fix.images.empty()) {
-    const bool whole = fix.shift_rows != 0 || !fix.rename_objects.empty() || fix.scale_camera != 1 ||
-                       fix.scale_focal != 1 ||
+    const bool whole = fix.shift_rows != 0 || fix.exchange || !fix.drop.empty() ||
+                       !fix.rename_objects.empty() || fix.scale_camera != 1 || fix.scale_focal != 1 ||
                        (IsTurned(fix.rotate_deg) && set.camera.width_px != set.camera.height_px);
     if (whole)
       return RefusedImages(set,
@@ -113,6 +124,33 @@ void FixPlacement(const ImageSetFix& fix, CameraPlacement* placement) {
       *vector = *fix.axes * *vector;
   if (fix.swap_eye_at) std::swap(placement->eye_m, placement->at_m);
   if (fix.up) placement->up = *fix.up;
+  if (fix.reverse_up) placement->up = -placement->up;
+}
+
+// Returns the rows that stay.
+std::vector<int> DropPictures(const std::vector<uint64_t>& images, ImageSet* set) {
+  std::vector<int> kept;
+  std::vector<PhotographRow> rows;
+  for (size_t row = 0; row < set->photographs.size(); ++row) {
+    if (std::find(images.begin(), images.end(), set->photographs[row].image) != images.end()) continue;
+    kept.push_back(static_cast<int>(row));
+    rows.push_back(std::move(set->photographs[row]));
+  }
+  set->photographs = std::move(rows);
+  return kept;
+}
+
+PhotographRow* FindPicture(uint64_t image, ImageSet* set) {
+  for (PhotographRow& row : set->photographs)
+    if (row.image == image) return &row;
+  return nullptr;
+}
+
+void ExchangePictures(const std::pair<uint64_t, uint64_t>& images, ImageSet* set) {
+  PhotographRow &one = *FindPicture(images.first, set), &other = *FindPicture(images.second, set);
+  std::swap(one.file, other.file);
+  std::swap(one.channels, other.channels);
+  std::swap(one.pixels, other.pixels);
 }
 
 // The pictures move down by `shift`; returns the rows that have one then.
@@ -152,14 +190,21 @@ void RenameAndNumber(const std::vector<std::pair<std::string, std::string>>& ren
 
 bool ImageSetFix::empty() const {
   return !plain_text && shift_rows == 0 && !changes_pixels() && rename_objects.empty() && scale_camera == 1 &&
-         scale_focal == 1 && scale_lengths == 1 && !axes && !swap_eye_at && !up;
+         scale_focal == 1 && scale_lengths == 1 && !axes && !swap_eye_at && !up && !reverse_up && !exchange &&
+         drop.empty();
 }
 
 absl::StatusOr<std::vector<int>> ApplyFix(const ImageSetFix& fix, ImageSet* set) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckImageFix(fix, *set));
   std::vector<int> left;
   for (int row = 0; row < static_cast<int>(set->size()); ++row) left.push_back(row);
-  if (fix.shift_rows != 0) left = ShiftPictures(fix.shift_rows, set);
+  if (!fix.drop.empty()) left = DropPictures(fix.drop, set);
+  if (fix.shift_rows != 0) {
+    std::vector<int> shifted;
+    for (const int row : ShiftPictures(fix.shift_rows, set)) shifted.push_back(left[row]);
+    left = std::move(shifted);
+  }
+  if (fix.exchange) ExchangePictures(*fix.exchange, set);
   const int width = set->camera.width_px, height = set->camera.height_px;
   for (PhotographRow& row : set->photographs) {
     const bool concerned =
@@ -203,6 +248,10 @@ std::string FixOptions(const ImageSetFix& fix) {
   scale("--scale-lengths", fix.scale_lengths);
   if (fix.axes) options.push_back("--permute-axes=" + FormatAxes(*fix.axes));
   if (fix.swap_eye_at) options.push_back("--swap-eye-at");
+  if (fix.reverse_up) options.push_back("--reverse-up");
+  if (fix.exchange)
+    options.push_back(absl::StrCat("--exchange ", fix.exchange->first, ",", fix.exchange->second));
+  if (!fix.drop.empty()) options.push_back("--drop-images " + absl::StrJoin(fix.drop, ","));
   if (fix.up)
     options.push_back(absl::StrCat("--up=", ShortestNumber(fix.up->x()), ",", ShortestNumber(fix.up->y()),
                                    ",", ShortestNumber(fix.up->z())));

@@ -25,6 +25,7 @@ struct ImageSetFix {
   // changes pictures or poses; names, rows and the camera belong to the whole set.
   std::vector<std::pair<uint64_t, uint64_t>> images;
   bool plain_text = false;  // images.csv as UTF-8 with commas, decimal points, '-' for minus (plain_csv.h)
+  std::vector<uint64_t> drop;  // pictures that are left out, by their numbers
   int shift_rows = 0;  // the picture of row k belongs to row k + shift_rows; rows that get none are dropped
   int rotate_deg = 0;  // pictures are turned clockwise by 90, 180 or 270
   Mirror mirror = Mirror::kNone;
@@ -37,7 +38,9 @@ struct ImageSetFix {
   // Each row has one entry of +1 or -1, each column too: new vector = axes * old one, of eye, at and up.
   std::optional<Eigen::Matrix3d> axes;
   bool swap_eye_at = false;
-  std::optional<Eigen::Vector3d> up;  // of every picture
+  std::optional<Eigen::Vector3d> up;                      // of every picture
+  bool reverse_up = false;                                // it points the other way
+  std::optional<std::pair<uint64_t, uint64_t>> exchange;  // these two pictures, by their numbers, change rows
 
   bool empty() const;
   bool changes_pixels() const { return rotate_deg != 0 || mirror != Mirror::kNone || swap_channels; }

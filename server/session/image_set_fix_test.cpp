@@ -92,6 +92,37 @@ TEST(ImageSetFix, FieldsThatStayKeepTheirBytes) {
   EXPECT_TRUE(fixed->changed_pixels.empty());
 }
 
+TEST(ImageSetFix, PicturesAreExchangedOrDroppedByTheirNumbers) {
+  ImageSetFix exchange;
+  exchange.exchange = {0, 2};
+  absl::StatusOr<FixedImageSet> fixed = FixImageSet(SmallSet(), kCsv, "camera as it was\n", exchange);
+  ASSERT_TRUE(fixed.ok()) << fixed.status();
+  EXPECT_EQ(fixed->images_csv,
+            "image,file,object,eye_x_mm,eye_y_mm,eye_z_mm,at_x_mm,at_y_mm,at_z_mm,up_x,up_y,up_z,cov_note\n"
+            "0,p2.png,cup,300.00,0,200,0,0,0,0,0,1,7.50\n"
+            "1,p1.png,cup,300.00,100,200,0,0,0,0,0,1,7.50\n"
+            "2,p0.png,star,300.00,200,200,0,0,0,0,0,1,7.50\n");
+  EXPECT_EQ(FixOptions(exchange), "--exchange 0,2");
+  ImageSetFix drop;
+  drop.drop = {1};
+  fixed = FixImageSet(SmallSet(), kCsv, "camera as it was\n", drop);
+  ASSERT_TRUE(fixed.ok()) << fixed.status();
+  ASSERT_EQ(fixed->set.size(), 2u);
+  EXPECT_EQ(fixed->images_csv.find("p1.png"), std::string::npos);
+  EXPECT_EQ(FixOptions(drop), "--drop-images 1");
+}
+
+TEST(ImageSetFix, ReversesUp) {
+  ImageSet set = SmallSet();
+  const Eigen::Vector3d up = set.photographs[1].commanded.up;
+  ImageSetFix fix;
+  fix.reverse_up = true;
+  fix.images = {{1, 1}};
+  ASSERT_TRUE(ApplyFix(fix, &set).ok());
+  EXPECT_EQ(set.photographs[1].commanded.up, -up);
+  EXPECT_EQ(set.photographs[0].commanded.up, up);
+}
+
 TEST(ImageSetFix, RefusesWhatTheSetDoesNotHave) {
   ImageSet set = SmallSet();
   ImageSetFix grey;
@@ -107,6 +138,15 @@ TEST(ImageSetFix, RefusesWhatTheSetDoesNotHave) {
   nobody.mirror = ImageSetFix::Mirror::kUpDown;
   nobody.images = {{40, 50}};
   EXPECT_FALSE(ApplyFix(nobody, &set).ok());
+  ImageSetFix absent;
+  absent.exchange = {0, 40};
+  EXPECT_NE(ApplyFix(absent, &set).status().message().find("image 40"), absl::string_view::npos);
+  ImageSetFix itself;
+  itself.exchange = {1, 1};
+  EXPECT_FALSE(ApplyFix(itself, &set).ok());
+  ImageSetFix all;
+  all.drop = {0, 1, 2};
+  EXPECT_FALSE(ApplyFix(all, &set).ok());
 }
 
 }  // namespace

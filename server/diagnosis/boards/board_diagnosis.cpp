@@ -20,6 +20,9 @@
 namespace touchstone::diagnosis::boards {
 namespace {
 
+constexpr double kCopyPx =
+    1e-3;  // corners of two pictures that were taken scatter by a hundredth of a pixel or more
+
 // `fullest`: the lens with all effects.
 engine::Quality QualityOf(const BoardSet& set, const LensFit& lens, const LensFit& fullest) {
   const double corners = static_cast<double>(set.pictures.size()) * set.board.corners();
@@ -28,10 +31,87 @@ engine::Quality QualityOf(const BoardSet& set, const LensFit& lens, const LensFi
           LackOfFitP(lens, fullest)};
 }
 
+std::string InWords(const BoardLens& lens) {
+  const auto value = [](const char* name, double value_px, double error_px) {
+    return error_px > 0 ? absl::StrFormat("%s %.2f +- %.2f", name, value_px, error_px)
+                        : absl::StrFormat("%s %.2f", name, value_px);
+  };
+  const session::CameraIntrinsics& c = lens.camera;
+  std::string words = absl::StrCat(
+      "The lens: ", value("fx", c.fx_px, lens.fx_error_px), ", ", value("fy", c.fy_px, lens.fy_error_px),
+      ", ", value("cx", c.cx_px, lens.cx_error_px), ", ", value("cy", c.cy_px, lens.cy_error_px), " px");
+  if (c.k1 != 0 || c.k2 != 0) absl::StrAppendFormat(&words, ", k1 %.4f, k2 %.4f", c.k1, c.k2);
+  return words + ".";
+}
+
+// Without pictures whose corners are another's to the last digits: a copy says nothing new.
+BoardSet WithoutCopies(const BoardSet& set, std::vector<std::string>* copies) {
+  BoardSet distinct = set;
+  distinct.pictures.clear();
+  for (const BoardPicture& picture : set.pictures) {
+    const bool copied =
+        std::any_of(distinct.pictures.begin(), distinct.pictures.end(), [&](const BoardPicture& other) {
+          double farthest_px = 0;
+          for (size_t corner = 0; corner < picture.corners_px.size(); ++corner)
+            farthest_px =
+                std::max(farthest_px, (picture.corners_px[corner] - other.corners_px[corner]).norm());
+          return farthest_px < kCopyPx;
+        });
+    if (copied)
+      copies->push_back(picture.file);
+    else
+      distinct.pictures.push_back(picture);
+  }
+  return distinct;
+}
+
+// How many orientations of the board lie kMinTiltApartDeg apart, each picture's against all that count so far.
+absl::StatusOr<int> OrientationsOf(const BoardSet& set, const image::PhotoLens& lens) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<BoardPose> poses, StartPoses(set, lens));
+  std::vector<Eigen::Vector3d> normals;
+  for (const BoardPose& pose : poses) {
+    const Eigen::Vector3d normal = pose.rotation.col(2);
+    if (std::all_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& other) {
+          return normal.dot(other) < std::cos(kMinTiltApartDeg * M_PI / 180);
+        }))
+      normals.push_back(normal);
+  }
+  return static_cast<int>(normals.size());
+}
+
+BoardLens LensOf(const BoardSet& set, const model::Model& model, const BoardDiagnosis& diagnosis) {
+  const image::PhotoLens found = LensOfModel(set.camera, model);
+  BoardLens lens;
+  lens.camera = set.camera;
+  lens.camera.fx_px = found.fx, lens.camera.fy_px = found.fy;
+  lens.camera.cx_px = found.cx, lens.camera.cy_px = found.cy;
+  lens.camera.k1 = found.k1, lens.camera.k2 = found.k2, lens.camera.k3 = found.k3;
+  lens.camera.p1 = found.p1, lens.camera.p2 = found.p2;
+  for (const engine::LadderStep& step : diagnosis.steps)
+    for (const engine::ParameterEstimate& p : step.parameters) {
+      if (step.effect == "focal_error") {
+        lens.fx_error_px = set.camera.fx_px * p.std_error;
+        lens.fy_error_px = set.camera.fy_px * p.std_error;
+      }
+      if (step.effect == "principal_point")
+        (p.entry == "x" ? lens.cx_error_px : lens.cy_error_px) = p.std_error;
+    }
+  return lens;
+}
+
 std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
   const auto error = [](const engine::Quality& quality) {
     return absl::StrFormat("%.3f px (%.3f px on left-out pictures)", quality.rmse, quality.heldout_rmse);
   };
+  if (diagnosis.verdict == engine::Verdict::kTooLittleData && diagnosis.orientations > 0)
+    return absl::StrFormat(
+        "The board was found in %d pictures, but stands in %d %s of %d that a lens takes, %g deg apart: "
+        "nothing "
+        "tells its focal length from the board's distance. Take pictures with the board tilted by 10 to 40 "
+        "deg, to "
+        "the left and right and up and down.",
+        diagnosis.pictures, diagnosis.orientations,
+        diagnosis.orientations == 1 ? "orientation" : "orientations", kMinOrientations, kMinTiltApartDeg);
   if (diagnosis.verdict == engine::Verdict::kTooLittleData)
     return absl::StrFormat(
         "The board was found in %d pictures; %d are needed, from different sides.%s", diagnosis.pictures,
@@ -56,6 +136,7 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
                     "): ", error(step.quality), ".");
   }
   if (diagnosis.steps.empty()) words += " No effect of the projection is missing.";
+  if (diagnosis.lens) absl::StrAppend(&words, " ", InWords(*diagnosis.lens));
   for (const BoardRest& rest : diagnosis.rest) {
     const auto value = [](std::string* out, const std::pair<std::string, double>& v) {
       absl::StrAppendFormat(out, "%s %.4g", v.first, v.second);
@@ -109,9 +190,13 @@ absl::Status AddRest(const BoardSet& set, const BoardSearch& search, const LensF
 
 }  // namespace
 
-absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::Model& model, uint64_t seed) {
+absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& all, const model::Model& model, uint64_t seed) {
   const auto began = std::chrono::steady_clock::now();
   BoardDiagnosis diagnosis;
+  const BoardSet set = WithoutCopies(all, &diagnosis.copies);
+  if (!diagnosis.copies.empty())
+    diagnosis.warnings.push_back(
+        absl::StrCat("the same picture as another, counted once: ", absl::StrJoin(diagnosis.copies, ", ")));
   diagnosis.model_name = model.name;
   diagnosis.model_hash = model.Hash();
   diagnosis.pictures = static_cast<int>(set.pictures.size());
@@ -123,6 +208,13 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   if (diagnosis.pictures < kMinBoardPictures) {
     diagnosis.verdict = engine::Verdict::kTooLittleData;
     diagnosis.pictures_needed = kMinBoardPictures;
+    diagnosis.summary = Summary(set, diagnosis);
+    return diagnosis;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.orientations, OrientationsOf(set, LensOfModel(set.camera, model)));
+  if (diagnosis.orientations < kMinOrientations) {
+    diagnosis.verdict = engine::Verdict::kTooLittleData;
+    diagnosis.pictures_needed = diagnosis.pictures + kMinOrientations - diagnosis.orientations;
     diagnosis.summary = Summary(set, diagnosis);
     return diagnosis;
   }
@@ -141,6 +233,7 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& set, const model::
   if (!diagnosis.steps.empty()) {
     diagnosis.improved_model = WithEffectsOf(model, ladder.back().fit.model.base());
   }
+  diagnosis.lens = LensOf(set, diagnosis.improved_model ? *diagnosis.improved_model : model, diagnosis);
   diagnosis.summary = Summary(set, diagnosis);
   diagnosis.duration_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return diagnosis;

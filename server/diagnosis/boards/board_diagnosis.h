@@ -23,6 +23,10 @@ namespace touchstone::diagnosis::boards {
 
 inline constexpr int kMinBoardPictures = 5;
 inline constexpr double kMinGainNats = 3;
+// Orientations of the board before the camera, this far apart, that a lens takes: each gives two conditions on fx, fy, cx and
+// cy (Zhang 2000); turned in its own plane or shifted the board gives none.
+inline constexpr int kMinOrientations = 3;
+inline constexpr double kMinTiltApartDeg = 5;
 
 // Errors (engine::Quality) are reprojection errors: sqrt(sum ||measured - predicted||^2 / corners), px, as
 // cv::calibrateCamera gives it; lens and poses fitted to all corners, or, held out, of left-out pictures. The lack of fit is
@@ -38,6 +42,12 @@ struct BoardRest {
   std::vector<std::pair<std::string, double>> values;  // "p1", ...
 };
 
+// The lens with all steps, px; standard errors of what they change, else 0.
+struct BoardLens {
+  session::CameraIntrinsics camera;
+  double fx_error_px = 0, fy_error_px = 0, cx_error_px = 0, cy_error_px = 0;
+};
+
 struct BoardDiagnosis {
   engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
@@ -47,7 +57,10 @@ struct BoardDiagnosis {
   std::vector<engine::LadderStep> steps;
   std::vector<engine::ConfoundedEffects> confounded;
   std::vector<BoardRest> rest;
-  int pictures_needed = 0;                     // with kTooLittleData
+  int pictures_needed = 0;          // with kTooLittleData
+  int orientations = 0;             // of the board, kMinTiltApartDeg apart; 0: not looked at
+  std::vector<std::string> copies;  // files whose corners are another's to the last digits: counted once
+  std::optional<BoardLens> lens;    // none with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
   std::string summary;
   std::vector<std::string> warnings;

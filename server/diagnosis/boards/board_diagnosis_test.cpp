@@ -134,12 +134,49 @@ TEST(BoardDiagnosis, IsTheSameEveryTimeAndErrorsFollowTheSeed) {
   EXPECT_EQ(one.summary, again.summary);
 }
 
-TEST(BoardDiagnosis, TakesOnePictureSixTimes) {
+TEST(BoardDiagnosis, CountsCopiesOfAPictureOnce) {
   BoardSet set = MakeBoardSet(LensWith({{kFocal, 0.05}, {kK1, -0.2}}), 1, 0.2, 12);
   while (set.pictures.size() < 6) set.pictures.push_back(set.pictures[0]);
   const BoardDiagnosis diagnosis = Diagnosed(set);
-  ASSERT_TRUE(diagnosis.final.has_value());
-  EXPECT_LE(diagnosis.final->rmse, diagnosis.initial->rmse);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kTooLittleData);
+  EXPECT_TRUE(diagnosis.steps.empty());
+  EXPECT_FALSE(diagnosis.lens.has_value());
+  EXPECT_EQ(diagnosis.copies.size(), 5u);
+  EXPECT_THAT(diagnosis.summary, HasSubstr("found in 1 pictures; 5 are needed"));
+}
+
+// Six pictures of one pose, each with its own scatter: no focal length follows from them.
+TEST(BoardDiagnosis, RefusesPosesThatDoNotSpan) {
+  BoardSet set = MakeBoardSet(LensWith({{kFocal, 0.05}, {kK1, -0.2}}), 1, 0, 12);
+  RandomStream random(5, RandomDomain::kTest);
+  while (set.pictures.size() < 6) {
+    set.pictures.push_back(set.pictures[0]);
+    set.pictures.back().file = std::to_string(set.pictures.size()) + ".png";
+    for (Eigen::Vector2d& corner : set.pictures.back().corners_px)
+      corner += 0.1 * Eigen::Vector2d(random.Normal(), random.Normal());
+  }
+  const BoardDiagnosis diagnosis = Diagnosed(set);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kTooLittleData);
+  EXPECT_TRUE(diagnosis.steps.empty());
+  EXPECT_EQ(diagnosis.orientations, 1);
+  EXPECT_THAT(diagnosis.summary, HasSubstr("1 orientation of 3"));
+  EXPECT_THAT(diagnosis.summary, HasSubstr("tilted"));
+}
+
+TEST(BoardDiagnosis, GivesTheLensInPixels) {
+  const LensVector hidden = LensWith({{kFocal, 0.04}, {kOffsetX, 3}, {kOffsetY, -4}, {kK1, -0.2}});
+  const BoardSet set = MakeBoardSet(hidden, 14, 0.2, 7);
+  const BoardDiagnosis diagnosis = Diagnosed(set);
+  ASSERT_TRUE(diagnosis.lens.has_value());
+  const BoardLens& lens = *diagnosis.lens;
+  const session::CameraIntrinsics real = CameraWith(set.camera, hidden);
+  EXPECT_GT(lens.fx_error_px, 0);
+  EXPECT_NEAR(lens.camera.fx_px, real.fx_px, 4 * lens.fx_error_px);
+  EXPECT_NEAR(lens.camera.fy_px, real.fy_px, 4 * lens.fy_error_px);
+  EXPECT_NEAR(lens.camera.cx_px, real.cx_px, 4 * lens.cx_error_px);
+  EXPECT_NEAR(lens.camera.cy_px, real.cy_px, 4 * lens.cy_error_px);
+  EXPECT_NEAR(lens.camera.k1, real.k1, 0.02);
+  EXPECT_THAT(diagnosis.summary, HasSubstr("The lens: fx "));
 }
 
 }  // namespace

@@ -76,6 +76,10 @@ void AddUnits(std::vector<CandidateMistake>* list) {
 }
 
 void AddAxes(std::vector<CandidateMistake>* list) {
+  CandidateMistake reversed =
+      OfSet(ProblemKind::kUpAxis, "up reversed", "the camera's up points down in every picture");
+  reversed.fix.reverse_up = true;
+  list->push_back(reversed);
   // Of the camera alone.
   for (int axis = 2; axis >= 0; --axis)
     for (const double sign : {1.0, -1.0}) {

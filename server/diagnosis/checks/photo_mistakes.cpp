@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "server/base/text.h"
+#include "server/diagnosis/checks/odd_pictures.h"
 #include "server/diagnosis/checks/photo_channel_order.h"
 #include "server/diagnosis/checks/photo_mistake_list.h"
 #include "server/diagnosis/checks/photo_trial.h"
@@ -67,6 +68,11 @@ class MistakeSearch {
       TryObjects();
       found = Best();
     }
+    if (found.empty())
+      for (OddPictures& odd : FindOddPictures(trial_, *input_.images)) {
+        TriedMistake tried{std::move(odd.mistake), odd.before, odd.after};
+        found.push_back(Told(tried, true));
+      }
     if (found.empty())
       if (std::optional<CandidateMistake> order = MixedChannelOrder(*input_.images)) {
         TriedMistake tried;
@@ -157,8 +163,12 @@ class MistakeSearch {
     if (tried.mistake.kind != ProblemKind::kChannelOrder)
       absl::StrAppend(
           &told.problem.words,
-          absl::StrFormat(" Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",
-                          100 * tried.after, 100 * tried.before));
+          absl::StrFormat(
+              tried.mistake.kind == ProblemKind::kOddPicture
+                  ? " Of the other pictures %.3g %% of the variation is unexplained (median), of it "
+                    "%.3g %%."
+                  : " Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",
+              100 * tried.after, 100 * tried.before));
     told.problem.fix =
         tried.mistake.fix.empty() ? tried.mistake.command : FixCommand(tried.mistake.fix, *input_.images);
     return told;

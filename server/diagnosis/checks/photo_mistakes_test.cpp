@@ -92,6 +92,52 @@ TEST(PhotoMistakes, PosesOfAnotherFrameAreFound) {
   ExpectFound(exchanged, ProblemKind::kEyeAt);
 }
 
+TEST(PhotoMistakes, ReversedUpIsFound) {
+  ImageSetFix reversed;
+  reversed.reverse_up = true;
+  const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
+  const std::vector<PhotoMistake> found = Found(Spoilt(input, reversed));
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kUpAxis);
+  EXPECT_TRUE(found[0].fix.reverse_up);
+}
+
+TEST(PhotoMistakes, TwoExchangedPicturesAreFound) {
+  const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
+  ImageSetFix exchange;
+  exchange.exchange = {2, 4};
+  const std::vector<PhotoMistake> found = Found(Spoilt(input, exchange));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kExchanged);
+  EXPECT_EQ(found[0].fix.exchange, exchange.exchange);
+  EXPECT_NE(found[0].problem.fix.find("--exchange 2,4"), std::string::npos);
+}
+
+TEST(PhotoMistakes, OnePictureWithReversedUpIsFound) {
+  const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
+  ImageSetFix one;
+  one.images = {{3, 3}};
+  one.reverse_up = true;
+  const std::vector<PhotoMistake> found = Found(Spoilt(input, one));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].problem.detail, "image 3");
+  EXPECT_EQ(found[0].fix.images, one.images);
+}
+
+TEST(PhotoMistakes, APictureWithAThumbInItIsNamed) {
+  images::HiddenCamera rig = SmallCamera();
+  rig.unlisted = [](int photograph, int column, int row, const image::Photo& photo, size_t pixel) {
+    const double x = column - 90.0, y = row - 80.0;
+    const bool thumb = photograph == 5 && x * x + y * y < 30 * 30;
+    return thumb ? 150.0 - photo.grey[pixel] : 0.0;
+  };
+  const std::vector<PhotoMistake> found = Found(images::MakePhotoInput(rig));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kOddPicture);
+  EXPECT_EQ(found[0].problem.detail, "image 5");
+  EXPECT_NE(found[0].problem.fix.find("--drop-images 5"), std::string::npos);
+}
+
 TEST(PhotoMistakes, ShiftedRowsAndExchangedNamesAreFound) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   ImageSetFix shift;

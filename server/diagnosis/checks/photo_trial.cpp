@@ -145,6 +145,14 @@ PhotoTrial::PhotoTrial(const DiagnosisInput& input, ThreadPool* pool) : input_(i
 
 std::vector<TrialPicture> PhotoTrial::Run(const session::ImageSetFix& fix, const model::Model* model,
                                           int only_object) const {
+  std::vector<int> rows;
+  for (const int row : rows_)
+    if (only_object < 0 || small_.photographs[row].object == only_object) rows.push_back(row);
+  return RunOn(rows, fix, model);
+}
+
+std::vector<TrialPicture> PhotoTrial::RunOn(const std::vector<int>& rows, const session::ImageSetFix& fix,
+                                            const model::Model* model) const {
   session::ImageSet fixed = small_;
   const absl::StatusOr<std::vector<int>> left = session::ApplyFix(fix, &fixed);
   if (!left.ok()) return {};
@@ -155,8 +163,7 @@ std::vector<TrialPicture> PhotoTrial::Run(const session::ImageSetFix& fix, const
   for (size_t k = 0; k < left->size(); ++k) {
     const int row = (*left)[k];
     const int object = small_.photographs[row].object;
-    if (!std::binary_search(rows_.begin(), rows_.end(), row) || (only_object >= 0 && object != only_object))
-      continue;
+    if (!std::binary_search(rows.begin(), rows.end(), row)) continue;
     pictures.push_back({row, object});
     place.push_back(static_cast<int>(k));
   }

@@ -28,6 +28,13 @@ class PhotoTrial {
   std::vector<TrialPicture> Run(const session::ImageSetFix& fix, const model::Model* model,
                                 int only_object) const;
 
+  // The same of these rows of the small set, all that the fix leaves.
+  std::vector<TrialPicture> RunOn(const std::vector<int>& rows, const session::ImageSetFix& fix,
+                                  const model::Model* model) const;
+  int size() const {
+    return static_cast<int>(small_.size());
+  }  // pictures of the small set, the first of the whole
+
   // Rows of small_set() that are compared.
   const std::vector<int>& rows() const { return rows_; }
 

@@ -74,7 +74,7 @@ void Parameterization::Free(int index, bool refit) {
       c.weights.assign(instance.values.size(), 0.0);
       for (int j = 0; j < count; ++j) c.weights[offset + j] = direction[j];
       c.scale = parameter.typical * si;
-      c.lower = parameter.lower * si;
+      c.lower = (refit ? parameter.lower : std::max(parameter.lower, parameter.least_claimed)) * si;
       c.upper = parameter.upper * si;
       c.neutral = parameter.sum_zero ? 0 : parameter.neutral * si;
       if (parameter.sum_zero) c.lower = std::min(c.lower, -c.upper);
@@ -135,6 +135,12 @@ std::string Parameterization::OnlyObject(int index) const {
   const model::EffectInstance& instance = base_.effects[index];
   const bool one = instance.per_object && instance.object_values.size() == 1 && objects_.size() > 1;
   return one ? instance.object_values.begin()->first : "";
+}
+
+void Parameterization::Hold(int index) {
+  parameters_.erase(std::remove_if(parameters_.begin(), parameters_.end(),
+                                   [&](const FreeParameter& c) { return c.effect == index; }),
+                    parameters_.end());
 }
 
 Parameterization Parameterization::Without(int index) const {

@@ -44,6 +44,8 @@ class Parameterization {
   void AddOn(std::shared_ptr<const model::Effect> effect, const std::string& object);
   // The one object among several on which effect `index` acts; empty: it has a value for each.
   std::string OnlyObject(int index) const;
+  // The effect keeps its values and is no longer free.
+  void Hold(int index);
   // Takes effect `index` out, with its free parameters.
   Parameterization Without(int index) const;
 

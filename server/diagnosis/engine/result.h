@@ -147,6 +147,8 @@ enum class ProblemKind {
   kEyeAt,
   kWrongObject,
   kFocalFactor,
+  kExchanged,
+  kOddPicture,
 };
 
 // A discrete mistake in a measurement file, and how to fix it.

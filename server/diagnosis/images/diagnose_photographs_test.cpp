@@ -78,6 +78,25 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLensIsDirty) {
   EXPECT_TRUE(d.steps.empty());
 }
 
+// Alone, the exposure takes most of the error: the dirt beside it must not hide it.
+TEST(DiagnosePhotographs, NamesALargeExposureBesideDirt) {
+  TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
+  HiddenCamera rig;
+  rig.hidden = {{"exposure", {"stops=0.15"}}};
+  rig.unlisted = [](int, int column, int row, const image::Photo& photo, size_t pixel) {
+    const double x = (column - 0.65 * photo.width) / (0.07 * photo.width),
+                 y = (row - 0.4 * photo.height) / (0.07 * photo.height);
+    return x * x + y * y < 1 ? -0.2 * photo.grey[pixel] : 0.0;
+  };
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
+  ASSERT_EQ(d.steps.size(), 1u);
+  EXPECT_EQ(d.steps[0].effect, "exposure");
+  EXPECT_LE(d.steps[0].probability, 0.9);
+  EXPECT_LT(d.steps[0].quality.rmse, d.initial->rmse);
+  EXPECT_NEAR(d.steps[0].quality.rmse, d.final->rmse, 0.01);
+}
+
 TEST(DiagnosePhotographs, NamesNothingWhereTheSurfaceIsPatchy) {
   TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;
@@ -231,6 +250,10 @@ TEST_P(OneHidden, IsNamedWithItsValue) {
     for (const std::string& text : GetParam().values) {
       const std::vector<std::string> parts = absl::StrSplit(text, '=');
       if (parts[0] != e.name) continue;
+      if (parts[1] == "srgb") {
+        hidden = 1;
+        continue;
+      }
       const std::vector<std::string> entries = absl::StrSplit(parts[1], ',');
       EXPECT_TRUE(absl::SimpleAtod(entries[e.entry.empty() ? 0 : e.entry[0] - 'x'], &hidden));
     }
@@ -250,7 +273,8 @@ INSTANTIATE_TEST_SUITE_P(
         Hidden{"defocus_blur", {"sigma_px=0.8"}}, Hidden{"motion_blur", {"length_px=3", "angle_deg=60"}},
         Hidden{"light_position", {"offset_mm=20,0,-10"}}, Hidden{"ambient_light", {"level=0.04"}},
         Hidden{"cast_shadow", {"strength=0.4"}}, Hidden{"specular", {"strength=0.2", "exponent=30"}},
-        Hidden{"background_level", {"grey=12"}},
+        Hidden{"background_level", {"grey=12"}}, Hidden{"black_level", {"grey=12"}},
+        Hidden{"response", {"curve=srgb"}},
         Hidden{"object_pose", {"translation_mm=1,-1,0.5", "rotation_deg=0.3,0,-0.5"}},
         Hidden{"object_scale", {"relative=0.01"}}),
     [](const auto& info) { return std::string(info.param.effect); });

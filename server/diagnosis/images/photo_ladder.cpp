@@ -1,7 +1,6 @@
 #include "server/diagnosis/images/photo_ladder.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/images/photo_covariates.h"
 #include "server/diagnosis/images/photo_formula.h"
+#include "server/diagnosis/images/photo_rest_kinds.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -98,17 +98,11 @@ class PhotoLadder {
   }
 
   absl::Status DescribeSteps() {
-    const engine::Experiment& experiment = *selection_.fine.experiment;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::OrderedStep> ordered,
-                                engine::OrderSteps(experiment, {fit_, selection_.initial_effects},
-                                                   selection_.field, selection_.steps));
-    for (const engine::OrderedStep& step : ordered) {
-      double heldout_ratio = selection_.heldout_ratio;
-      if (!step.whole) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(heldout_ratio, HeldOutRatio(*selection_.photographs,
-                                                                *selection_.fine.rows, experiment, step.fit));
-      }
-      TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*step.step, step.whole ? values_ : step.fit, heldout_ratio));
+    for (const PhotoRung& rung : selection_.rungs) {
+      const auto step = std::find_if(selection_.steps.begin(), selection_.steps.end(),
+                                     [&](const auto& other) { return other.effect == rung.effect; });
+      if (step != selection_.steps.end())
+        TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(*step, rung.fit, rung.heldout_ratio));
     }
     return absl::OkStatus();
   }
@@ -154,13 +148,6 @@ class PhotoLadder {
     }
   }
 
-  // On what the improved model leaves, expected with the noise that it leaves.
-  absl::StatusOr<std::vector<PhotoCovariate>> CovariatesOf(const model::Model& model) const {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
-                                ExpectPhotographs(*selection_.photographs, model, true, pool_));
-    return TestCovariates(*selection_.photographs, expected);
-  }
-
   // What was not found good enough for a step is not probable, whatever it is compared with; nor is what leaves a rest.
   void DoubtSteps() {
     if (selection_.steps.empty())
@@ -193,43 +180,43 @@ class PhotoLadder {
   // A structure that no named effect explains.
   absl::Status AssessRest() {
     const engine::Likelihood& likelihood = *selection_.fine.likelihood;
-    const double q = likelihood.Gram(engine::Likelihood::Pick(fit_.columns, {0}), fit_.hypothesis)(0, 0);
+    const double q = likelihood.Gram(likelihood.Prepare(fit_.columns.values.col(0)), fit_.hypothesis)(0, 0);
     const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
     const double p = ChiSquaredTail(q, freedom);
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
     const bool misfit = (p < kRestP && std::sqrt(q / freedom) > kMisfitRows) ||
                         d_.final->rmse > kMisfitPixels * d_.noise_floor.sigma;
-    const bool albedo = fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<PhotoCovariate> curves, CovariatesOf(improved_));
-    const bool curve = std::any_of(curves.begin(), curves.end(), [](const PhotoCovariate& c) {
-      return c.p < kRestP && c.unseen_gain > kCurveGain;
-    });
-    if (!misfit && !albedo && !curve && selection_.field < 0) return absl::OkStatus();
+    // What the improved model leaves, expected with the noise that it leaves.
+    const Photographs& judged = *selection_.photographs;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
+                                ExpectPhotographs(judged, improved_, true, pool_));
+    const std::vector<KindOfRest> kinds = KindsOfRest(judged, expected, pool_);
+    const bool albedo = fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats &&
+                        ShareOf(RestKind::kOnObjects, kinds) > 0;
     engine::UnexplainedRest rest;
+    for (const PhotoCovariate& c : TestCovariates(judged, expected))
+      if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
+    if (!misfit && !albedo && rest.covariates.empty() && selection_.field < 0) return absl::OkStatus();
     rest.rmse = d_.final->rmse;
     rest.heldout_rmse = d_.final->heldout_rmse;
-    for (const PhotoCovariate& c : curves)
-      if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
     TOUCHSTONE_RETURN_IF_ERROR(AddSuggestion(&rest));
-    // What a formula or a curve says as well is not said again.
-    const bool said = !rest.formula.empty() || !rest.lookup_yaml.empty();
-    if (selection_.field >= 0 && !said)
-      absl::StrAppend(
-          &rest.words,
-          "Grey levels that are the same in every picture and smooth across it: dirt on the lens, a "
-          "reflection, stray light. Photograph a plain white sheet.");
-    if (albedo && !said)
-      absl::StrAppend(
-          &rest.words, rest.words.empty() ? "" : " ",
-          "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
-          "dirt, or a shape that departs from its mesh.");
-    if (misfit && rest.words.empty() && !said)
-      rest.words =
-          "Pictures differ from what is expected by more than their pixels scatter, and nothing in the "
-          "catalogue "
-          "explains it.";
+    DescribeKind(kinds, &rest);
     d_.unexplained = std::move(rest);
     return absl::OkStatus();
+  }
+
+  // The kind of the rest, unless a formula or a curve says more of it.
+  void DescribeKind(const std::vector<KindOfRest>& kinds, engine::UnexplainedRest* rest) const {
+    if (!kinds.empty() && kinds[0].share > rest->heldout_gain) {
+      rest->words = kinds[0].words;
+      return;
+    }
+    if (!kinds.empty() || !rest->covariates.empty() || !rest->formula.empty() || !rest->lookup_yaml.empty())
+      return;
+    rest->words =
+        "Pictures differ from what is expected by more than their pixels scatter. Nothing in the catalogue "
+        "explains it, and it depends on none of what was tried: places in the picture and on the objects, "
+        "brightness and place of each picture, contours, grey level, incidence, depth, time.";
   }
 
   const DiagnosisInput& input_;

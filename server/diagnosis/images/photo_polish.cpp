@@ -34,6 +34,7 @@ absl::StatusOr<PolishRows> MakePolishRows(const Photographs& photographs, const 
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection) {
   selection->polished = selection->fit;
+  selection->covariance = selection->fit.covariance;
   if (selection->fit.model.size() == 0) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const PolishRows all, MakePolishRows(photographs, selection->fit, context));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection->polished, engine::FitModel(all.experiment, selection->fit.model));

@@ -18,6 +18,7 @@ constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr double kStepP = 1e-4;                // of a step's values, with the scatter between pictures
 constexpr double kFaint = 0.1;                 // of the noise
 constexpr double kWidthStarts[] = {0.5, 1.0};  // over the typical size
+constexpr int kMaxRefits = 4, kMaxRareRefits = 2;
 constexpr int kAnchorPasses = 5;
 constexpr double kAnchorStays =
     1;  // standard errors by which a value moves from an anchor that is near enough
@@ -175,6 +176,9 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   made.experiment->pool = context.pool;
   engine::SearchRules rules;
   rules.cv_gain_over_noise = true;
+  // A fit of photographs takes a second: where nothing explains them, fits of what might are most of a diagnosis.
+  rules.max_refits = kMaxRefits;
+  rules.max_rare_refits = kMaxRareRefits;
   made.search = std::make_unique<engine::StepwiseSearch>(*made.experiment, candidates, rules,
                                                          [](const std::string&) {});
   return made;
@@ -222,9 +226,12 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
   TOUCHSTONE_RETURN_IF_ERROR(DropFaintField(&selection));
   TOUCHSTONE_RETURN_IF_ERROR(DropUnsteady(&selection));
+  TOUCHSTONE_RETURN_IF_ERROR(AddLargeSteps(*selection.photographs, context, &selection));
+  TOUCHSTONE_RETURN_IF_ERROR(HoldChoices(&selection));
   for (size_t e = 0; e < selection.fit.model.base().effects.size(); ++e)
     if (selection.fit.model.base().effects[e].effect->name == kImageFieldName)
       selection.field = static_cast<int>(e);
+  TOUCHSTONE_RETURN_IF_ERROR(KeepStepsWithGain(*selection.photographs, context, &selection));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.steps,
       engine::FindCompetitors(*selection.fine.search, {selection.fit, selection.initial_effects},
@@ -233,9 +240,8 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.heldout_ratio,
       HeldOutRatio(*selection.photographs, *selection.fine.rows, *selection.fine.experiment, selection.fit));
-  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(*selection.photographs, context, &selection));
   const engine::Likelihood& likelihood = *selection.fine.likelihood;
-  const engine::Likelihood::Columns residual = engine::Likelihood::Pick(selection.fit.columns, {0});
+  const engine::Likelihood::Columns residual = likelihood.Prepare(selection.fit.columns.values.col(0));
   std::vector<double> with;
   const double none =
       likelihood.LogPrior(0) + likelihood.LogLikelihood(likelihood.Gram(residual, 0)(0, 0), 0);

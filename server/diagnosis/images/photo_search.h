@@ -16,6 +16,8 @@ namespace touchstone::diagnosis::images {
 struct PhotoSearch {
   std::unique_ptr<PhotoRows> rows;
   std::unique_ptr<engine::Likelihood> likelihood;
+  std::unique_ptr<engine::Likelihood>
+      plain;  // without a smooth error of the albedo, where the experiment has none
   std::unique_ptr<engine::Experiment> experiment;
   std::unique_ptr<engine::StepwiseSearch> search;
 };
@@ -28,6 +30,14 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
                                             const std::vector<engine::Candidate>& candidates,
                                             const PhotoRowsOptions& options, const DiagnosisContext& context);
 
+// A fit on the way to the whole explanation: with this effect and those of all rungs before it.
+struct PhotoRung {
+  int effect = 0;   // index in the explanation's model
+  engine::Fit fit;  // of the last rung: the polished one, without what is nameless
+  double rmse = 0;  // grey levels, of all photographs
+  double heldout_ratio = 1;
+};
+
 struct PhotoSelection {
   // The same photographs, with the noise of what the coarse search leaves: what the fine one and its fits work on.
   std::unique_ptr<Photographs> photographs;
@@ -39,6 +49,7 @@ struct PhotoSelection {
   engine::Fit polished;
   int initial_effects = 0;
   int field = -1;                           // index of the image field's effect; -1: none
+  std::vector<PhotoRung> rungs;             // of the ladder, in the order in which they explain most
   std::vector<engine::SelectedStep> steps;  // named effects
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
   // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
@@ -62,6 +73,21 @@ absl::StatusOr<PolishRows> MakePolishRows(const Photographs& photographs, const 
 
 // Fits the explanation to every photograph: `polished` and `covariance`.
 absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisContext& context,
+                               PhotoSelection* selection);
+
+// Adds effects that each take three fifths or more of the excess error from pictures that they were not fitted to, where the
+// explanation leaves a clear misfit: a smooth error of the albedo and of the picture, which take the place of such an effect
+// and of what lies beside it, take no part from then on.
+absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContext& context,
+                           PhotoSelection* selection);
+
+// Choices (ParameterInfo::choices), between which fits move freely, become what they are nearest to, and are no longer free;
+// an effect whose value is none of them goes.
+absl::Status HoldChoices(PhotoSelection* selection);
+
+// Polishes the explanation, and takes out every step with which the error, of all pictures or of those that its fit did
+// not see, does not fall: `polished`, `covariance`, `rungs`.
+absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection);
 
 // The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -16,6 +17,7 @@ constexpr double kNoTail = 1e-12;
 constexpr double kKept = 0.8;             // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
 constexpr double kClipped = 4;            // standard deviations from black or white
+constexpr double kClippedBin = 5;         // ... of the levels of a bin whose scatter is not cut, at least
 constexpr double kTrimmedEfficiency =
     0.35;                          // of a trimmed difference that shares pixels, as a degree of freedom
 constexpr double kMinCount = 200;  // differences that a bin needs
@@ -32,6 +34,26 @@ double TrimmedVariance(const double* counts, const double* squares, int steps) {
     left -= taken;
   }
   return total > 0 ? sum / (kKept * total) / kKeptVariance : 0;
+}
+
+// The scatter at one grey level.
+struct LevelScatter {
+  double grey = 0, variance = 0, count = 0;
+};
+
+// Levels whose pixels are hardly ever clipped: what is cut at black or white scatters too little. Where every level is
+// clipped, the one farthest from black and white.
+std::vector<LevelScatter> Unclipped(const std::vector<LevelScatter>& levels, double bin_grey) {
+  if (levels.empty()) return levels;
+  const auto room = [&](const LevelScatter& level) {
+    return std::min(level.grey, kWhite - level.grey) - 0.5 * bin_grey;
+  };
+  std::vector<LevelScatter> kept;
+  for (const LevelScatter& level : levels)
+    if (room(level) > 0 && room(level) >= kClippedBin * std::sqrt(level.variance)) kept.push_back(level);
+  if (!kept.empty()) return kept;
+  return {*std::max_element(levels.begin(), levels.end(),
+                            [&](const auto& a, const auto& b) { return room(a) < room(b); })};
 }
 
 double Tail(double z) {  // P(Z > z)
@@ -139,17 +161,22 @@ double NoiseGatherer::count() const {
 }
 
 PixelNoise NoiseGatherer::Estimate() const {
-  // variance = sigma^2 + gain * grey over the bins, each weighed by count / variance^2.
-  std::vector<double> grey, variance, weight;
+  std::vector<LevelScatter> levels;
+  constexpr double kBinGrey = kGreyLevels / kBins;
   for (int bin = 0; bin < kBins; ++bin) {
-    double count = 0;
-    for (int s = 0; s < kSteps; ++s) count += counts_[static_cast<size_t>(bin) * kSteps + s];
-    // The darkest bin holds what is left of clipped pixels.
-    if (count < kMinCount || bin == 0) continue;
     const size_t at = static_cast<size_t>(bin) * kSteps;
-    grey.push_back((bin + 0.5) * kGreyLevels / kBins);
-    variance.push_back(std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance));
-    weight.push_back(count / (variance.back() * variance.back()));
+    const double count = std::accumulate(&counts_[at], &counts_[at] + kSteps, 0.0);
+    if (count < kMinCount) continue;
+    levels.push_back({(bin + 0.5) * kBinGrey,
+                      std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance),
+                      count});
+  }
+  // variance = sigma^2 + gain * grey over the levels, each weighed by count / variance^2.
+  std::vector<double> grey, variance, weight;
+  for (const LevelScatter& level : Unclipped(levels, kBinGrey)) {
+    grey.push_back(level.grey);
+    variance.push_back(level.variance);
+    weight.push_back(level.count / (level.variance * level.variance));
   }
   if (grey.empty()) return {std::sqrt(kRoundingVariance), 0, 0, 0};
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;

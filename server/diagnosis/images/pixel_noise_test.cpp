@@ -57,5 +57,27 @@ TEST(PixelNoise, IsFoundInPicturesOfSmoothShades) {
   EXPECT_NEAR(found.Variance(120), 4 + 1.0 / 12 + 0.05 * 120, 0.3);
 }
 
+// Repeats of a picture whose light grows beyond white, as overexposed ones have it; a third of it lies at black.
+TEST(PixelNoise, IsFoundWherePixelsAreNotClipped) {
+  constexpr int kSide = 300;
+  for (const double step : {1.0, 2.0, 4.0}) {
+    RandomStream random(6, RandomDomain::kTest);
+    std::vector<float> image(kSide * kSide), difference(kSide * kSide);
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const double grey = std::min(std::max(step * (i % kSide - 100), 0.0), 255.0);
+      const auto taken = [&] {
+        return static_cast<float>(std::min(std::max(std::lround(grey + 2 * random.Normal()), 0L), 255L));
+      };
+      image[i] = taken();
+      difference[i] = image[i] - taken();
+    }
+    NoiseGatherer gathered;
+    gathered.Add(difference, image, kSide, kSide, 0.5);
+    const PixelNoise found = gathered.Estimate();
+    EXPECT_NEAR(found.sigma_grey, std::sqrt(4 + 1.0 / 12), 4 * found.sigma_error) << step;
+    EXPECT_NEAR(found.gain, 0, 4 * found.gain_error) << step;
+  }
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis::images

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/engine/result.h"
@@ -132,6 +133,7 @@ struct DataReport {
 
   std::optional<PhotographDescription> photographs;
   std::optional<distributions::PoseFreeComparison> distributions;
+  std::optional<boards::BoardLens> lens;
 };
 
 using NextMeasurement = std::variant<design::ProposedTouch, images::ProposedPhotograph>;

@@ -161,6 +161,25 @@ void WriteCandidate(const Candidate& candidate, v1::Candidate* message) {
   *message->mutable_scope() = ScopeMessage(candidate.scope, candidate.parameters);
 }
 
+void WriteLens(const boards::BoardLens& lens, v1::LensReport* message) {
+  const session::CameraIntrinsics& camera = lens.camera;
+  message->set_width_px(Unsigned(camera.width_px));
+  message->set_height_px(Unsigned(camera.height_px));
+  message->set_fx_px(camera.fx_px);
+  message->set_fy_px(camera.fy_px);
+  message->set_cx_px(camera.cx_px);
+  message->set_cy_px(camera.cy_px);
+  message->set_k1(camera.k1);
+  message->set_k2(camera.k2);
+  message->set_p1(camera.p1);
+  message->set_p2(camera.p2);
+  message->set_k3(camera.k3);
+  message->set_fx_std_error_px(lens.fx_error_px);
+  message->set_fy_std_error_px(lens.fy_error_px);
+  message->set_cx_std_error_px(lens.cx_error_px);
+  message->set_cy_std_error_px(lens.cy_error_px);
+}
+
 void WriteSet(const DataReport& data, v1::DataSummary* message) {
   message->set_rows(Unsigned(data.rows));
   *message->mutable_objects() = {data.objects.begin(), data.objects.end()};
@@ -190,6 +209,7 @@ v1::DataReport ToMessage(const DataReport& data) {
   for (const Curve& curve : data.curves) WriteCovariateCurve(curve, message.add_curves());
   WriteTouches(data, &message);
   if (data.photographs) WritePhotographs(*data.photographs, message.mutable_photographs());
+  if (data.lens) WriteLens(*data.lens, message.mutable_lens());
   if (data.distributions) WriteDistributions(*data.distributions, message.mutable_distributions());
   return message;
 }

@@ -28,7 +28,7 @@ void WriteStep(const Step& step, v1::Step* message) {
 }
 
 v1::DataProblem::Kind KindMessage(engine::ProblemKind kind) {
-  static_assert(static_cast<int>(engine::ProblemKind::kFocalFactor) + 1 == v1::DataProblem::FOCAL_FACTOR);
+  static_assert(static_cast<int>(engine::ProblemKind::kOddPicture) + 1 == v1::DataProblem::ODD_PICTURE);
   return static_cast<v1::DataProblem::Kind>(static_cast<int>(kind) + 1);
 }
 

@@ -98,6 +98,23 @@ def _unlisted(name, strength):
     return make
 
 
+def _overexposed(seed):
+    stops = float(sets.stream(seed, "overexposed").uniform(0.7, 1.6))
+    return _with_effects("overexposed", {"exposure": stops}, "realistic", sets.make_scene(seed))
+
+
+def _beside(name):
+    """A listed cause that holds most of the error, beside one that no catalogue lists."""
+    def make(seed):
+        scene = sets.make_scene(seed)
+        size = _unlisted_size(name, "strong", scene)
+        truth = sets.Truth(f"exposure beside {name}", seed, "strong", {"exposure": 0.25}, unlisted=name, notes={"size": size})
+        causes = unlisted.physics_of(name, size, scene)
+        return sets.make_files(scene, truth, lambda number: dataclasses.replace(causes(number), exposure=0.25))
+
+    return make
+
+
 def _blunder(name):
     def make(seed):
         files = _nothing(seed)
@@ -115,6 +132,9 @@ ARMS = (
     + [Arm(f"albedo {rms:g}", "albedo", 15, _albedo(rms, length)) for rms, length in ALBEDO]
     + [Arm(f"{s} {n}", "unlisted", 10, _unlisted(n, s)) for n in unlisted.NAMES for s in UNLISTED_SIGMAS]
     + [Arm("blunder " + n, "blunders", 6, _blunder(n)) for n in blunders.NAMES]
+    + [Arm(f"realistic {e}", "realistic", 8, _one(e, "realistic")) for e in strengths.RESPONSES]
+    + [Arm("overexposed", "realistic", 8, _overexposed)]
+    + [Arm(f"exposure beside {n}", "unlisted", 6, _beside(n)) for n in ("dirt", "reflection")]
 )
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import photograph
 import sets
 
-NAMES = ("mirrored", "rotated", "channel_order", "wrong_object", "focal_factor", "row_shift", "up_axis", "units_length")
+NAMES = ("mirrored", "rotated", "channel_order", "wrong_object", "focal_factor", "row_shift", "up_axis", "units_length",
+         "up_reversed", "exchanged", "thumb")
 # A mistake that makes the same set is as right an answer: a picture on its head is a camera whose up is reversed.
 KINDS = {
     "mirrored": ("mirrored",),
@@ -15,6 +16,9 @@ KINDS = {
     "row_shift": ("row_shift",),
     "up_axis": ("up_axis", "rotated"),
     "units_length": ("units_length",),
+    "up_reversed": ("up_axis",),
+    "exchanged": ("exchanged",),
+    "thumb": ("odd_picture",),
 }
 
 
@@ -62,6 +66,23 @@ def make(name, files, random):
         for row in rows:
             row["eye"], row["at"] = row["eye"] * factor, row["at"] * factor
         files.truth.notes["factor"] = factor
+    elif name == "up_reversed":
+        for row in rows:
+            row["up"] = -np.asarray(row["up"])
+    elif name == "exchanged":
+        one, other = (int(k) for k in random.choice(len(rows), 2, replace=False))
+        pictures[one], pictures[other] = pictures[other], pictures[one]
+        files.truth.notes["images"] = (one, other)
+    elif name == "thumb":
+        # Skin, out of focus, over a corner of one picture.
+        number = int(random.integers(len(rows)))
+        height, width = pictures[number].shape
+        row, column = np.mgrid[:height, :width]
+        inside = ((column - 0.9 * width) / random.uniform(40, 70)) ** 2 + ((row - 0.85 * height) / random.uniform(50, 80)) ** 2
+        share = 1 / (1 + np.exp(12 * (inside - 1)))
+        skin = random.uniform(90, 180) + 2 * random.standard_normal((height, width))
+        pictures[number] = np.clip(np.floor((1 - share) * pictures[number] + share * skin + 0.5), 0, 255).astype(np.uint8)
+        files.truth.notes["image"] = number
     else:
         raise ValueError(name)
     files.truth.blunder = name

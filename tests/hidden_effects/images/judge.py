@@ -30,6 +30,8 @@ PARAMETERS = {
     "cast_shadow": (("strength", ""),),
     "specular": (("strength", ""), ("exponent", "")),
     "background_level": (("grey", ""),),
+    "black_level": (("grey", ""),),
+    "response": (("curve", ""),),
 }
 
 
@@ -86,7 +88,8 @@ def _cover(step, values, mark):
             truth = value + (truth - value + 90) % 180 - 90
         low, high = _number(estimate["lower"]), _number(estimate["upper"])
         mark.covered.append(bool(low <= truth <= high))
-        mark.errors.append((value - truth) / error)
+        if error > 0:  # a choice has none
+            mark.errors.append((value - truth) / error)
 
 
 def of_photographs(report):

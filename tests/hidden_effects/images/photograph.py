@@ -55,6 +55,8 @@ class Physics:
     motion_blur: tuple = (0, 0)
     exposure: float = 0
     gamma: float = 1
+    response: float = 0  # 1: the camera writes sRGB's curve
+    black_level: float = 0  # pedestal, grey levels
     image_noise: tuple = (2, 0)  # sigma_grey, gain
     # Not in any catalogue.
     albedo: object = None  # points (n x 3, mm) -> factor of the surface's light
@@ -181,7 +183,10 @@ def record(light, camera, physics):
     if physics.reflection is not None:
         light = light + physics.reflection
     light = np.clip(light * 2.0 ** (physics.exposure + physics.flicker_stops), 0, 1)
-    return 255 * light ** physics.gamma
+    recorded = light ** physics.gamma
+    if physics.response:
+        recorded = np.where(recorded <= 0.0031308, 12.92 * recorded, 1.055 * recorded ** (1 / 2.4) - 0.055)
+    return np.minimum(255 * recorded + physics.black_level, 255)
 
 
 def lit(solid, seen, camera, physics):

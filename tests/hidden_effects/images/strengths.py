@@ -19,6 +19,8 @@ SAMPLE = 15  # pictures that the signal is measured on, three of each object
 EFFECTS = ("focal_error", "radial_distortion", "principal_point", "camera_translation", "camera_rotation", "exposure",
            "gamma", "vignetting", "defocus_blur", "motion_blur", "light_position", "ambient_light", "cast_shadow",
            "specular", "background_level")
+# Of cameras that write something else than light. Their arms come last: seeds count arms.
+RESPONSES = ("response", "black_level")
 
 # Where nothing changes, for those that differ from zero, and the entries that a strength scales (others keep).
 NEUTRAL = {"gamma": 1.0}
@@ -65,6 +67,10 @@ def drawn(effect, random):
         return (r.uniform(0.08, 0.4), r.uniform(8, 60))
     if effect == "background_level":
         return r.uniform(5, 30)
+    if effect == "black_level":
+        return r.uniform(4, 20)
+    if effect == "response":
+        return 1.0
     raise ValueError(effect)
 
 
