@@ -19,7 +19,32 @@ class Finder {
         whole_{modality.alone(), static_cast<int>(modality.given().effects.size())} {}
 
   absl::StatusOr<Findings> Run() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(found_.initial, modality_.Compare(modality_.given()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Quality initial, modality_.Compare(modality_.given()));
+    for (;;) {
+      found_ = Findings();
+      found_.initial = initial;
+      TOUCHSTONE_RETURN_IF_ERROR(Climb());
+      const int step = StepWithoutGain(initial, found_.steps);
+      if (step < 0) break;
+      TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit,
+                                  FitModel(experiment_, whole_.fit.model.Without(climbed_[step])));
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
+    if (found_.steps.empty() && found_.final.rmse > initial.rmse) {
+      // New values that compare worse are none.
+      found_.improved = modality_.given();
+      found_.final = initial;
+      found_.refitted.clear(), found_.superfluous.clear();
+      values_wrong_ = false;
+    }
+    TOUCHSTONE_RETURN_IF_ERROR(Rank());
+    SetVerdict();
+    return std::move(found_);
+  }
+
+ private:
+  // Values, steps and their errors of the explanation as it stands.
+  absl::Status Climb() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const FinalRows rows, modality_.RowsNear(whole_.fit));
     values_ = whole_.fit;
     if (rows.owner != nullptr) {
@@ -29,14 +54,9 @@ class Finder {
     found_.improved = values_.model.base();
     RoundValues(values_, &found_.improved);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven(covariance));
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps(covariance));
-    TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
-    TOUCHSTONE_RETURN_IF_ERROR(Rank());
-    SetVerdict();
-    return std::move(found_);
+    return DescribeSteps(covariance);
   }
 
- private:
   absl::StatusOr<Quality> QualityOf(const model::Model& model, const Fit& searched, const Fit& final) const {
     TOUCHSTONE_ASSIGN_OR_RETURN(Quality quality, modality_.Compare(model));
     TOUCHSTONE_ASSIGN_OR_RETURN(const HeldOutError heldout, modality_.HeldOut(searched, final));
@@ -61,12 +81,14 @@ class Finder {
                                 FindCompetitors(search_, whole_, -1, {}));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<OrderedStep> ordered,
                                 OrderSteps(experiment_, whole_, -1, selected));
+    climbed_.clear();
     for (const OrderedStep& next : ordered) {
       LadderStep step = DescribeStep(values_, covariance, *next.step);
       AddConfounded(step, &found_.confounded);
       const Fit& final = next.whole ? values_ : next.fit;
       step.model = next.whole ? found_.improved : final.model.base();
       TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOf(step.model, next.fit, final));
+      climbed_.push_back(next.step->effect);
       found_.steps.push_back(std::move(step));
     }
     return absl::OkStatus();
@@ -104,8 +126,9 @@ class Finder {
   const double noise_;
   const Experiment& experiment_;
   const StepwiseSearch search_;
-  const Explanation whole_;
+  Explanation whole_;
   Fit values_;
+  std::vector<int> climbed_;  // the effect of each step
   bool values_wrong_ = false;
   Findings found_;
 };

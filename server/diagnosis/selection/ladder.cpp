@@ -83,11 +83,9 @@ class LadderBuilder {
   absl::StatusOr<int> Climb() {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
-    if (ladder_.steps.empty()) return -1;
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        const engine::Quality before,
-        QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
-    const int step = engine::StepWithoutGain(before, ladder_.steps);
+        before_, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
+    const int step = engine::StepWithoutGain(before_, ladder_.steps);
     if (step < 0) return -1;
     const int effect = climbed_[step];
     return effect + (has_formula() && effect >= selection_.formula);
@@ -102,6 +100,7 @@ class LadderBuilder {
     ladder_.final = left_;
     TOUCHSTONE_ASSIGN_OR_RETURN(const double final_s, ErrorAsCompared(workspace_, ladder_.improved));
     SetError(final_s, &ladder_.final);
+    if (ladder_.steps.empty() && ladder_.values_wrong && ladder_.final.rmse > before_.rmse) KeepGiven();
     ladder_.set_aside = JudgeTouchesSetAside(*workspace_.observations, ladder_.residuals, ladder_.final.rmse,
                                              ladder_.noise_floor.sigma);
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
@@ -176,8 +175,16 @@ class LadderBuilder {
     return absl::OkStatus();
   }
 
+  // New values that compare worse are none.
+  void KeepGiven() {
+    ladder_.improved = *workspace_.input.model;
+    ladder_.final = before_;
+    ladder_.refitted.clear(), ladder_.superfluous.clear();
+    ladder_.values_wrong = ladder_.changed = false;
+  }
+
   // Values of the given model's effects that were set free: new ones, or zero as far as the data can tell.
-  // Returns the latter, largest index first.
+  // Returns the indices of the latter, largest first.
   absl::StatusOr<std::vector<int>> DescribeGiven() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         engine::GivenEffects given,
@@ -310,7 +317,8 @@ class LadderBuilder {
   std::vector<int> climbed_;  // the effect of each of the ladder's steps, by its index in saved_
   engine::Fit fit_;           // as saved_, on all touches
   std::optional<model::Model> with_formula_;
-  engine::Quality left_;  // on the touches that the fits used: what the verdict is about
+  engine::Quality before_;  // of the model as it was given
+  engine::Quality left_;    // on the touches that the fits used: what the verdict is about
   Doubts doubts_;
   RoundStructure rounds_;
   SurfaceSupport support_;
