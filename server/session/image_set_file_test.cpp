@@ -185,9 +185,7 @@ TEST(ImageSetFile, WrongHeadersAreRefusedWithTheirColumn) {
               HasSubstr("column 'measured_eye_y_mm' is missing; a measured pose has all nine"));
   EXPECT_THAT(error(absl::StrCat(kHeader, ",cov_ä")), HasSubstr("is no name of a covariate"));
   EXPECT_THAT(error(absl::StrCat(kHeader, ",")), HasSubstr("a comma too many"));
-  EXPECT_THAT(error(absl::StrReplaceAll(kHeader, {{",", ";"}})), HasSubstr("';' where commas were expected"));
   EXPECT_THAT(error(""), HasSubstr("a header line was expected"));
-  EXPECT_THAT(error("\xFF\xFEi"), HasSubstr("is UTF-16"));
 }
 
 TEST(ImageSetFile, WrongFieldsAreRefusedWithTheirLineAndColumn) {

@@ -24,7 +24,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const char kCsv[] =
+const char kCsvOfSessionFiles[] =
     "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,approach_x,approach_y,approach_"
     "z,"
     "lateral_x,lateral_y,lateral_z,t_l_us,t_m_us,t_r_us,session_time_s,round,face,cov_temperature\n"
@@ -57,10 +57,10 @@ class SessionFiles : public ::testing::Test {
 };
 
 TEST_F(SessionFiles, AMeasurementFileComesBackAsItWas) {
-  Import(kCsv);
+  Import(kCsvOfSessionFiles);
   const std::string out = folder_ + "/out.csv";
   ASSERT_TRUE(ExportSessionCsv(*journal_, "s", out).ok());
-  EXPECT_EQ(*ReadFile(out), kCsv);
+  EXPECT_EQ(*ReadFile(out), kCsvOfSessionFiles);
   const auto session = journal_->Session("s");
   EXPECT_EQ(session->done, 3u);
   EXPECT_EQ(session->fingers, 3);
@@ -106,7 +106,7 @@ TEST_F(SessionFiles, WhatIsExportedStandsInTheOrderOfTheApproaches) {
 }
 
 TEST_F(SessionFiles, AnEmulatorsMarkGoesAlongIntoEveryFileAndBack) {
-  Import(kCsv);
+  Import(kCsvOfSessionFiles);
   EXPECT_FALSE(journal_->Session("s")->emulated);
   SessionContent content = *ReadSessionCsv(csv_, options_);
   content.session.name = "emulated";
@@ -125,7 +125,7 @@ TEST_F(SessionFiles, AnEmulatorsMarkGoesAlongIntoEveryFileAndBack) {
 }
 
 TEST_F(SessionFiles, OfAPlanFromAnEmulatedSessionTheSessionSaysWhetherItIs) {
-  std::string text = kCsv;
+  std::string text = kCsvOfSessionFiles;
   text.insert(text.find('\n'), ",cov_emulated");
   for (size_t at = text.find('\n', text.find('\n') + 1); at != std::string::npos;
        at = text.find('\n', at + 3))
@@ -176,8 +176,8 @@ void ExpectSame(const MeasurementSet& a, const MeasurementSet& b, double toleran
 }
 
 TEST_F(SessionFiles, ASessionIsTheSetThatItsFileIsReadAs) {
-  Import(kCsv);
-  const auto file = ParseMeasurementSet(kCsv, "s");
+  Import(kCsvOfSessionFiles);
+  const auto file = ParseMeasurementSet(kCsvOfSessionFiles, "s");
   const auto direct = SessionMeasurementSet(*journal_, "s", "s");
   ASSERT_TRUE(file.ok() && direct.ok()) << direct.status();
   ExpectSame(*direct, *file, 0);
@@ -220,7 +220,7 @@ TEST_F(SessionFiles, WhatARigMeasuredIsTheSetThatItsFileIsReadAs) {
 }
 
 TEST_F(SessionFiles, ASetIsRefusedWhereItsFileWouldBe) {
-  const auto touches = ParseMeasurements(kCsv, "s");
+  const auto touches = ParseMeasurements(kCsvOfSessionFiles, "s");
   ASSERT_TRUE(touches.ok());
   const auto refusal = [&](const std::function<void(MeasuredTouch*)>& change) {
     std::vector<MeasuredTouch> changed = *touches;
@@ -239,11 +239,11 @@ TEST_F(SessionFiles, ASetIsRefusedWhereItsFileWouldBe) {
 }
 
 TEST_F(SessionFiles, ImportsAreWholeOrAbsent) {
-  Import(kCsv);
+  Import(kCsvOfSessionFiles);
   EXPECT_TRUE(absl::IsAlreadyExists(Add(ReadSessionCsv(csv_, options_))));
   options_.session = "t";
   const std::string plan = folder_ + "/plan.csv";
-  const std::string text = kCsv;
+  const std::string text = kCsvOfSessionFiles;
   ASSERT_TRUE(WriteFileAtomically(plan,
                                   "touch,object,speed_mm_s,standoff_mm,target_x_mm,target_y_mm,target_z_mm,"
                                   "approach_x,approach_y,approach_z,lateral_x,lateral_y,lateral_z\n"
@@ -257,7 +257,7 @@ TEST_F(SessionFiles, ImportsAreWholeOrAbsent) {
 }
 
 TEST_F(SessionFiles, AnHdf5FileComesBackAsTheSessionThatItWas) {
-  Import(kCsv);
+  Import(kCsvOfSessionFiles);
   std::vector<JournalTouch> more(1);
   more[0].id = "with poses";
   more[0].object = "cup";
