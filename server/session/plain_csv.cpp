@@ -16,6 +16,9 @@
 namespace touchstone::session {
 namespace {
 
+// Share of a column's whole numbers that are no longer than the last one, from which its length is usual.
+constexpr double kUsualLength = 0.05;
+
 constexpr absl::string_view kSeparators = ",;\t|";
 
 // Columns that hold names; all others hold numbers.
@@ -188,7 +191,7 @@ class CsvConversion {
     if (point(last) != std::string::npos)
       return share([&](const std::string& other) { return decimals(other) > 2 * decimals(last); }) > 0.5;
     if (share([&](const std::string& other) { return point(other) != std::string::npos; }) > 0.5) return true;
-    return share([&](const std::string& other) { return other.size() > last.size(); }) > 0;
+    return share([&](const std::string& other) { return other.size() <= last.size(); }) < kUsualLength;
   }
 
   std::string PlainText(bool thorough) const {

@@ -24,7 +24,7 @@ class Finder {
       found_ = Findings();
       found_.initial = initial;
       TOUCHSTONE_RETURN_IF_ERROR(Climb());
-      const int step = StepWithoutGain(initial, found_.steps);
+      const int step = StepWithoutGain(initial, QualitiesOf(found_.steps));
       if (step < 0) break;
       TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit,
                                   FitModel(experiment_, whole_.fit.model.Without(climbed_[step])));

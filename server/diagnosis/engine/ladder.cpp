@@ -63,14 +63,20 @@ absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment
   return ordered;
 }
 
-int StepWithoutGain(const Quality& before, const std::vector<LadderStep>& steps) {
+int StepWithoutGain(const Quality& before, const std::vector<Quality>& after) {
   const Quality* last = &before;
-  for (size_t j = 0; j < steps.size(); ++j) {
-    if (!(steps[j].quality.rmse < last->rmse && steps[j].quality.heldout_rmse < last->heldout_rmse))
+  for (size_t j = 0; j < after.size(); ++j) {
+    if (!(after[j].rmse < last->rmse && after[j].heldout_rmse < last->heldout_rmse))
       return static_cast<int>(j);
-    last = &steps[j].quality;
+    last = &after[j];
   }
   return -1;
+}
+
+std::vector<Quality> QualitiesOf(const std::vector<LadderStep>& steps) {
+  std::vector<Quality> qualities;
+  for (const LadderStep& step : steps) qualities.push_back(step.quality);
+  return qualities;
 }
 
 LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from) {

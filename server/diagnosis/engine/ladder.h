@@ -25,8 +25,10 @@ absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment
                                                     int nameless, const std::vector<SelectedStep>& steps);
 
 // The first step with which the error of the fit, or on parts that it did not see, does not fall: no step; -1: each is
-// one. `before`: of the given model.
-int StepWithoutGain(const Quality& before, const std::vector<LadderStep>& steps);
+// one. `before`: of the given model; `after`: of the model with each step and all earlier ones.
+int StepWithoutGain(const Quality& before, const std::vector<Quality>& after);
+// The qualities of steps.
+std::vector<Quality> QualitiesOf(const std::vector<LadderStep>& steps);
 
 // Everything but the error and the model. `values`: the fit that its values are taken from, of the same effects as the one
 // that was selected.

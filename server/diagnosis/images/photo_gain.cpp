@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_search.h"
@@ -204,19 +205,17 @@ absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisCo
   for (;;) {
     TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
     TOUCHSTONE_ASSIGN_OR_RETURN(selection->rungs, RungsOf(photographs, context, *selection));
-    TOUCHSTONE_ASSIGN_OR_RETURN(double seen,
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double given,
                                 ErrorOf(photographs, selection->initial.model.base(), context.pool));
-    double unseen = seen;
-    const auto idle =
-        std::find_if(selection->rungs.begin(), selection->rungs.end(), [&](const PhotoRung& rung) {
-          const bool falls = rung.rmse < seen && rung.rmse * rung.heldout_ratio < unseen;
-          seen = rung.rmse, unseen = rung.rmse * rung.heldout_ratio;
-          return !falls;
-        });
-    if (idle == selection->rungs.end()) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, engine::FitModel(*selection->fine.experiment,
-                                                                 selection->fit.model.Without(idle->effect)));
-    if (selection->field > idle->effect) --selection->field;
+    std::vector<engine::Quality> after;
+    for (const PhotoRung& rung : selection->rungs)
+      after.push_back({rung.rmse, rung.rmse * rung.heldout_ratio, 0});
+    const int idle = engine::StepWithoutGain({given, given, 0}, after);
+    if (idle < 0) return absl::OkStatus();
+    const int effect = selection->rungs[idle].effect;
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(effect)));
+    if (selection->field > effect) --selection->field;
   }
 }
 

@@ -85,7 +85,7 @@ class LadderBuilder {
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     TOUCHSTONE_ASSIGN_OR_RETURN(
         before_, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
-    const int step = engine::StepWithoutGain(before_, ladder_.steps);
+    const int step = engine::StepWithoutGain(before_, engine::QualitiesOf(ladder_.steps));
     if (step < 0) return -1;
     const int effect = climbed_[step];
     return effect + (has_formula() && effect >= selection_.formula);
