@@ -189,7 +189,10 @@ TEST(ModelHash, IsAboutPhysicsAndNotAboutTheName) {
 }
 
 TEST(Yaml, LinesMayEndInCarriageReturnsAndNumbersHaveUnicodeSigns) {
-  for (const char* text : {"a: 1\rb: \xE2\x88\x92""2.5\r", "a: 1\r\nb: \xE2\x88\x92""2.5\r\n"}) {
+  for (const char* text : {"a: 1\rb: \xE2\x88\x92"
+                           "2.5\r",
+                           "a: 1\r\nb: \xE2\x88\x92"
+                           "2.5\r\n"}) {
     const auto tree = ParseYaml(text, "m.yaml");
     ASSERT_TRUE(tree.ok()) << tree.status();
     ASSERT_NE(tree->Find("b"), nullptr);

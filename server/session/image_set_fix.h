@@ -24,7 +24,7 @@ struct ImageSetFix {
   // Only these pictures are wrong, by their numbers, first and last; empty: all. Others stay as they are. For what
   // changes pictures or poses; names, rows and the camera belong to the whole set.
   std::vector<std::pair<uint64_t, uint64_t>> images;
-  bool plain_text = false;  // images.csv as UTF-8 with commas, decimal points, '-' for minus (plain_csv.h)
+  bool plain_text = false;     // images.csv as UTF-8 with commas, decimal points, '-' for minus (plain_csv.h)
   std::vector<uint64_t> drop;  // pictures that are left out, by their numbers
   int shift_rows = 0;  // the picture of row k belongs to row k + shift_rows; rows that get none are dropped
   int rotate_deg = 0;  // pictures are turned clockwise by 90, 180 or 270

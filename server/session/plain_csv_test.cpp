@@ -65,7 +65,8 @@ TEST(PlainCsv, WhatOtherProgramsWriteIsReadWhereItIsCertain) {
   ExpectTheSame("\xEF\xBB\xBFsep=,\n" + PlainFile());
   ExpectTheSame(AsUtf16(PlainFile()));
   ExpectTheSame(AsUtf16(Continental("\t")));
-  ExpectTheSame(absl::StrCat(kPlainHeader, absl::StrReplaceAll(kPlainRows, {{"20.5", "\"20,5\""},
+  ExpectTheSame(
+      absl::StrCat(kPlainHeader, absl::StrReplaceAll(kPlainRows, {{"20.5", "\"20,5\""},
                                                                   {"-1.6504", "\"-1,6504\""},
                                                                   {"-0.6504", "\"-0,6504\""},
                                                                   {"0.25", "\"0,25\""},

@@ -64,7 +64,8 @@ TEST(ProposeTouches, WhatNoTouchCanTellGivesNone) {
 // One that holds the other: a common sag is a shift of every object along z, whatever else the pose fits of the noise.
 TEST(ProposeTouches, WhatTheOtherImitatesExactlyIsToldByNone) {
   const Effects sag = {{"gravity_sag", {"drop_mm=0.3"}}};
-  const Effects shift = {{"object_pose", {"translation_mm=0.002,-0.001,0.3", "rotation_deg=0.001,0.002,-0.001"}}};
+  const Effects shift = {
+      {"object_pose", {"translation_mm=0.002,-0.001,0.3", "rotation_deg=0.001,0.002,-0.001"}}};
   EXPECT_EQ(Proposed({sag, shift}, 12).size(), 0u);
   EXPECT_EQ(Proposed({shift, sag}, 12).size(), 0u);
 }

@@ -31,7 +31,8 @@ class LinearHypotheses {
 Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics);
 
 struct NothingMissing {
-  double p = 1;  // 0 to 1; from draws at least 1 / (draws + 1), or the least p value times the hypotheses where that is less
+  double p =
+      1;  // 0 to 1; from draws at least 1 / (draws + 1), or the least p value times the hypotheses where that is less
   int hypotheses = 0;
 };
 // `p_values`: hypotheses x draws; column 0 has those of the data.

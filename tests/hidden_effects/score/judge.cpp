@@ -196,8 +196,7 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
       const bool gross_errors = truth.outlier_share > 0.01;
       const bool unexplained = report.verdict() == v1::Report::UNEXPLAINED;
       bool claim = (unexplained && !gross_errors) || report.verdict() == v1::Report::WRONG_VALUES;
-      if (gross_errors)
-        marks.push_back({"owns up to gross errors", unexplained || report.steps_size() > 0});
+      if (gross_errors) marks.push_back({"owns up to gross errors", unexplained || report.steps_size() > 0});
       for (const v1::Step& step : report.steps()) claim |= !Contains(arm.tolerated, step.effect());
       marks.push_back({"false claim", claim});
       break;
