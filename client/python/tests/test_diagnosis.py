@@ -50,6 +50,7 @@ def test_the_hidden_effect_is_found_and_the_error_falls(report):
     assert np.isnan(report.rmse_grey) and np.isnan(report.final_rmse_grey)
     data, = report.data
     assert (data.kind, data.unit, data.emulated) == ("touches", "us", False)
+    assert report.p_nothing_missing < 1e-3 and report.suggested_model == ""
     assert data.after_step[-1].rmse == pytest.approx(data.final.rmse) and report.of("photographs") is None
 
 

@@ -116,6 +116,11 @@ class Report:
         return "" if name == "verdict_unspecified" else name
 
     @property
+    def p_nothing_missing(self) -> float | None:
+        """The chance that data of the given model look at least as bad, over all that was tried; None: not assessed."""
+        return self.message.p_nothing_missing if self.message.HasField("p_nothing_missing") else None
+
+    @property
     def summary(self) -> str:
         return self.message.summary
 
@@ -182,6 +187,11 @@ class Report:
     def improved_model(self) -> str:
         """The model file with all steps and refitted values, to be given as `model=`; "" if nothing changed."""
         return self.message.improved_model_yaml
+
+    @property
+    def suggested_model(self) -> str:
+        """The improved model with the formula or curve for what no effect explains, in its place; "" if there is none."""
+        return next((data.unexplained.model_yaml for data in self.message.data if data.unexplained.model_yaml), "")
 
     @property
     def next_touches(self) -> Sequence[Row]:

@@ -196,9 +196,9 @@ def test_the_ladder_adds_one_effect_of_the_report_after_the_other():
     lookup = "  - lookup:\n      name: rest\n      adds: travel_mm\n      covariate: travel_mm\n      knots: [0, 1]\n      values: [0, 1]\n"
     report = types.SimpleNamespace(
         improved_model=improved, steps=[types.SimpleNamespace(effect="tip_radius"), types.SimpleNamespace(effect="object_push")],
-        data=[types.SimpleNamespace(message=types.SimpleNamespace(unexplained=types.SimpleNamespace(lookup_yaml=lookup)))])
+        suggested_model=improved + lookup)
     names, models = zip(*ladder.models(report))  # type: ignore[arg-type]  # a stand-in
-    assert names == ("nominal", "+ tip_radius", "+ object_push", "+ lookup")
+    assert names == ("nominal", "+ tip_radius", "+ object_push", "+ suggestion")
     assert [("tip_radius" in m, "object_push" in m, "lookup" in m) for m in models] == [
         (False, False, False), (True, False, False), (True, True, False), (True, True, True)]
     assert all(m.count("gaussian_noise") == 1 for m in models)

@@ -86,9 +86,9 @@ def models(report: touchstone.Report) -> list[tuple[str, str]]:
     for step in report.steps:
         kept += [block for block in blocks if _effect(block) == step.effect]
         found.append((f"+ {step.effect}", head + "".join(kept)))
-    rest = report.data[0].message.unexplained.lookup_yaml
-    if rest:
-        found.append(("+ lookup", head + "".join(kept) + rest.rstrip("\n") + "\n"))
+    if report.suggested_model:
+        # What `diagnose --save-model --with-formula` writes: in its place, with every value fitted beside it.
+        found.append(("+ suggestion", report.suggested_model))
     return found
 
 
