@@ -41,7 +41,7 @@ TEST(WronglyWound, FindsAPartThatIsInsideOut) {
   EXPECT_THAT(WronglyWound(Joined(one, other)), IsEmpty());
   TriangleMesh mesh = Joined(one, InsideOut(other));
   EXPECT_THAT(WronglyWound(mesh), ElementsAre(4, 5, 6, 7));
-  EXPECT_NEAR(InspectMesh(mesh).signed_volume_m3, 0, 1e-12);
+  EXPECT_NEAR(InspectMesh(mesh).signed_volume_m3, 0, 1e-11);
   Turn(WronglyWound(mesh), &mesh);
   EXPECT_THAT(WronglyWound(mesh), IsEmpty());
   EXPECT_NEAR(InspectMesh(mesh).signed_volume_m3, 2 * 0.05 * 0.05 * 0.05 / 6, 1e-10);
