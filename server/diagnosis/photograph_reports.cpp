@@ -18,6 +18,8 @@ namespace touchstone::diagnosis {
 namespace {
 
 constexpr int kDefaultPhotographs = 6;  // proposed by Diagnose where something is confounded
+// Errors without odd pictures over those with them, above which the others are as wrong: it is no mistake of single pictures.
+constexpr double kMaxLeftByOthers = 0.7;
 
 using Engine = std::function<absl::StatusOr<images::PhotographDiagnosis>(images::Expectation*)>;
 
@@ -48,6 +50,14 @@ engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const Diagno
     problem.words += absl::StrFormat(" The model as it is would be off by %.3g grey levels instead of %.3g.",
                                      problem.error_after, before_grey);
   return problem;
+}
+
+// Single pictures that seem to show something else, although most of the error is in all others too: physics that acts in
+// some pictures more than in others (a cast shadow) looks like that.
+bool IsOfAllPictures(const checks::PhotoMistake& mistake, const DiagnosisInput& input, ThreadPool* pool) {
+  if (mistake.problem.kind != engine::ProblemKind::kOddPicture) return false;
+  const double before_grey = GreyErrorOf(input, pool);
+  return !(WithErrors(mistake, input, before_grey, pool).error_after < kMaxLeftByOthers * before_grey);
 }
 
 absl::StatusOr<report::Diagnosis> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
@@ -115,7 +125,11 @@ absl::StatusOr<std::optional<report::Diagnosis>> PhotographDataErrors(const Diag
                                                                       const DiagnosisContext& context) {
   if (context.progress && !context.progress("checking the data", 0.02))
     return absl::CancelledError("the diagnosis was cancelled");
-  const std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
+  std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
+  mistakes.erase(
+      std::remove_if(mistakes.begin(), mistakes.end(),
+                     [&](const auto& mistake) { return IsOfAllPictures(mistake, input, context.pool); }),
+      mistakes.end());
   if (mistakes.empty()) return std::optional<report::Diagnosis>();
   const auto engine = [&](images::Expectation* expectation) -> absl::StatusOr<images::PhotographDiagnosis> {
     TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
