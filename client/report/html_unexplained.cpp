@@ -80,11 +80,12 @@ std::string LookupCurve(const v1::DataReport& data) {
                  "be measured."))),
       terms.empty() ? "" : absl::StrCat("<dl>", terms, "</dl>\n"),
       rest.formula_yaml().empty() && !rest.lookup_yaml().empty()
-          ? absl::StrCat("<h3>To add it, under <code>effects</code> in the model file</h3>\n<div "
-                         "class=\"row\"><button "
-                         "type=\"button\" data-copy=\"lookup\">Copy</button><span>or touchstone diagnose ... "
-                         "--save-model FILE --with-formula</span></div>\n<pre class=\"wrap\" id=\"lookup\">",
-                         Escape(rest.lookup_yaml()), "</pre>\n")
+          ? absl::StrCat(
+                "<h3>As text; <code>--save-model FILE --with-formula</code> adds it in its place</h3>\n<div "
+                "class=\"row\"><button "
+                "type=\"button\" data-copy=\"lookup\">Copy</button><span>or touchstone diagnose ... "
+                "--save-model FILE --with-formula</span></div>\n<pre class=\"wrap\" id=\"lookup\">",
+                Escape(rest.lookup_yaml()), "</pre>\n")
           : "");
 }
 
@@ -126,7 +127,7 @@ std::string RestOf(const v1::DataReport& data) {
   body += LookupCurve(data);
   if (!rest.formula_yaml().empty()) {
     absl::StrAppend(&body,
-                    "<h3>To add it, under <code>effects</code> in the model file</h3>\n"
+                    "<h3>As text; <code>--save-model FILE --with-formula</code> adds it in its place</h3>\n"
                     "<div class=\"row\"><button type=\"button\" data-copy=\"formula\">Copy</button></div>\n"
                     "<pre id=\"formula\">",
                     Escape(rest.formula_yaml()), "</pre>\n");

@@ -225,7 +225,8 @@ void AddRest(const v1::Unexplained& rest, const ErrorScale& scale, TextLayout* o
   out->Paragraph(text + ".");
   for (const v1::ParameterValue& parameter : rest.parameters()) out->Paragraph(Parameter(parameter, true));
   if (rest.formula_yaml().empty()) return;
-  out->Paragraph("To add it, put this under effects in the model file:");
+  out->Paragraph(
+      "--save-model FILE --with-formula adds it in its place and fits the other effects beside it. As text:");
   out->Verbatim(rest.formula_yaml());
 }
 

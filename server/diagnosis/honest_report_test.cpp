@@ -154,6 +154,7 @@ TEST(HonestReport, SaysThatAPartOfTheTimesWasReadInTicks) {
   const report::Diagnosis diagnosis = Diagnosed(input);
   EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
   EXPECT_THAT(diagnosis.summary, HasSubstr("lie on ticks of 10 ms"));
+  EXPECT_LT(*diagnosis.p_nothing_missing, 1e-6);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "server/diagnosis/selection/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/noise_sample.h"
+#include "server/diagnosis/touches/ticks.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -63,8 +64,10 @@ class Tester {
       return engine::NothingMissing{0, hypotheses_.size()};
     const Eigen::MatrixXd linear = hypotheses_.PValues(residuals);
     const Eigen::MatrixXd others = engine::PValuesOfStatistics(Statistics(residuals));
-    Eigen::MatrixXd p_values(linear.rows() + others.rows(), residuals.cols());
-    p_values << linear, others;
+    Eigen::RowVectorXd ticks = Eigen::RowVectorXd::Ones(residuals.cols());
+    ticks[0] = TicksP();
+    Eigen::MatrixXd p_values(linear.rows() + others.rows() + 1, residuals.cols());
+    p_values << linear, others, ticks;
     return engine::WorstOfAll(p_values);
   }
 
@@ -164,6 +167,17 @@ class Tester {
       residuals.col(draw) = contrasts_.Apply(noise_s);
     }
     return residuals;
+  }
+
+  // Of times that lie on a tick, all or a part, where the given model has none: each would with 2 tolerance / tick.
+  double TicksP() const {
+    const auto& given = workspace_.input.model->effects;
+    const bool declared = std::any_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
+      return instance.effect->role == model::EffectRole::kQuantisation;
+    });
+    const touches::TouchTicks ticks = touches::FindTouchTicks(o_);
+    if (declared || ticks.interval_s == 0) return 1;
+    return std::pow(2 * touches::kTickToleranceS / ticks.interval_s, ticks.touches);
   }
 
   // What the noise looks like and what repeats share, of each draw (columns), whatever its size.
