@@ -117,12 +117,18 @@ absl::Status AddNextTouches(const selection::Workspace& workspace,
   const engine::ExplanationsLeft left =
       engine::FindExplanationsLeft(selection.fit, selection.steps, ladder.improved);
   if (!left.confounded && !always) return absl::OkStatus();
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const std::vector<design::ProposedTouch> touches,
-      design::ProposeTouches(*workspace.searched, left.models, ladder.noise_floor.sigma, max_touches,
-                             workspace.input.seed, workspace.context.pool));
+  const auto propose = [&](const std::vector<engine::ExplanationsLeft::NamedModel>& models) {
+    return design::ProposeTouches(*workspace.searched, models, ladder.noise_floor.sigma, max_touches,
+                                  workspace.input.seed, workspace.context.pool);
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<design::ProposedTouch> touches, propose(left.models));
+  const bool none = touches.empty();
+  // What no touch tells apart has values nevertheless.
+  if (always && none && left.models.size() > 1) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(touches, propose({left.models[0]}));
+  }
   diagnosis->next.assign(touches.begin(), touches.end());
-  if (!always || !touches.empty()) return absl::OkStatus();
+  if (!always || !none) return absl::OkStatus();
   diagnosis->warnings.push_back(
       left.models.size() < 2
           ? "No touch would tell more than those at hand."

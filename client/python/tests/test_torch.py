@@ -248,7 +248,8 @@ def test_epochs_repeat_or_renew_the_samples(server, workers, persistent):
 def test_workers_spread_over_servers_and_survive_the_loss_of_one(server, new_server, values):
     own = new_server()
     # The pictures are there for their size, 24 MB a worker: most of it is not sent yet when the server is killed.
-    options = {**OPTIONS, "batch_size": 10, "columns": (*OPTIONS["columns"], "image"), "image": touchstone.image(128, 128, "rgb")}
+    options = {**OPTIONS, "batch_size": 10, "columns": (*OPTIONS["columns"], "image"), "image": touchstone.image(128, 128, "rgb"),
+               "plan": touchstone.sphere(step_angle_deg=5, radius_ratio=1.05)}
     loader = TouchstoneDataset([server.target, own.target], **options).loader(num_workers=2)
     parts = []
     for k, batch in enumerate(loader):
