@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/decompositions.h"
+
 namespace touchstone::diagnosis::design {
 namespace {
 
-constexpr int kMaxToVerdict = 100000;  // more measurements than that are no advice
+constexpr int kMaxToVerdict = 100000;     // more measurements than that are no advice
+constexpr double kCurvatureShare = 1e-3;  // of the square of a difference, that is no difference
+constexpr double kNegligible = 1e-9;      // weight of the prior: values that no candidate sees stay
 
 // The best model against a competing one: either may be true, and the other is fitted to it.
 struct ModelPair {
@@ -21,13 +25,23 @@ struct ModelPair {
   bool tied = false;  // no measurement tells the two apart: numbers of measurements would be made up
 };
 
-// Whether all candidates together would reach no verdict, whichever of the two is true. Models that imitate each other differ
-// by what they have fitted of the present noise, and that does not grow with the candidates.
-bool IsTied(ModelPair pair, const LinearisedPrediction& best, size_t candidates) {
-  for (size_t k = 0; k < candidates; ++k)
-    if (best.predicted[k].allFinite())
-      pair.competing.Add(static_cast<int>(k)), pair.best.Add(static_cast<int>(k));
-  return 0.5 * std::min(pair.competing.separation(), pair.best.separation()) < kVerdictNats;
+// Whether a model imitates the best one, so that no measurement speaks against it: fitted to all candidates as that predicts them, whatever the present data
+// say of its values, it leaves less than a verdict needs, or nothing but the curvature of what is linearised here.
+bool Imitates(const LinearisedPrediction& fitted, const LinearisedPrediction& truth) {
+  const Eigen::Index values = fitted.covariance.rows();
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(values, values);
+  Eigen::VectorXd cross = Eigen::VectorXd::Zero(values);
+  double apart = 0;
+  for (size_t k = 0; k < fitted.predicted.size(); ++k) {
+    const Eigen::VectorXd difference = truth.predicted[k] - fitted.predicted[k];
+    if (!difference.allFinite() || !fitted.derivative[k].allFinite()) continue;
+    gram += fitted.derivative[k].transpose() * fitted.derivative[k];
+    cross += fitted.derivative[k].transpose() * difference;
+    apart += difference.squaredNorm();
+  }
+  gram.diagonal().array() += kNegligible;
+  const double left = apart - cross.dot(SymmetricSolver(gram).Solve(cross));
+  return 0.5 * left < kVerdictNats || left < kCurvatureShare * apart;
 }
 
 // Chooses measurements one after the other, spread over the objects.
@@ -69,7 +83,8 @@ MeasurementChooser::MeasurementChooser(const std::vector<std::string>& names,
   for (size_t j = alone() ? 0 : 1; j < names.size(); ++j)
     pairs_.push_back({SequentialRefit(&predictions[j], &predictions[0]),
                       SequentialRefit(&predictions[0], &predictions[j])});
-  for (ModelPair& pair : pairs_) pair.tied = !alone() && IsTied(pair, predictions[0], objects.size());
+  for (size_t pair = 0; pair < pairs_.size() && !alone(); ++pair)
+    pairs_[pair].tied = Imitates(predictions[pair + 1], predictions[0]);
 }
 
 double MeasurementChooser::Worth(int k) const {
