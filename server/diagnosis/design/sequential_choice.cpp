@@ -25,8 +25,9 @@ struct ModelPair {
   bool tied = false;  // no measurement tells the two apart: numbers of measurements would be made up
 };
 
-// Whether a model imitates the best one, so that no measurement speaks against it: fitted to all candidates as that predicts them, whatever the present data
-// say of its values, it leaves less than a verdict needs, or nothing but the curvature of what is linearised here.
+// Whether a model imitates the best one, so that no measurement speaks against it: fitted to all candidates as that predicts
+// them, whatever the present data say of its values, it leaves less than a verdict needs, or nothing but the curvature of
+// what is linearised here.
 bool Imitates(const LinearisedPrediction& fitted, const LinearisedPrediction& truth) {
   const Eigen::Index values = fitted.covariance.rows();
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(values, values);
