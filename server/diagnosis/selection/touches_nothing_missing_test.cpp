@@ -51,7 +51,7 @@ TEST(TouchesNothingMissing, HasAUniformPWhereNothingIsHidden) {
 }
 
 // The given model's own noise is drawn, whatever its shape.
-TEST(TouchesNothingMissing, HasAUniformPUnderNoiseWithTailsAndMemory) {
+TEST(TouchesNothingMissing, HasAUniformPUnderNoiseWithHeavyTails) {
   TOUCHSTONE_SECOND_TIER("statistical: 200 sets");
   std::vector<double> p;
   for (int set = 0; set < 200; ++set) {
