@@ -16,7 +16,7 @@ constexpr double kMinFactor = 0.003;  // of a difference in speed that is worth 
 constexpr double kRestIsNoiseP =
     1e-4;                      // of the round's scatter once the factor is taken off, over the others'
 constexpr int kMinPairs = 20;  // poses of a round that others have touched too
-constexpr int kFewestRounds = 3, kMostRounds = 40;
+constexpr int kMinComparedRounds = 3, kMaxComparedRounds = 40;
 
 // The contrasts of one touch with all its fingers, by its round.
 using RoundsOfPose = std::map<int, Eigen::VectorXd>;
@@ -66,17 +66,18 @@ Eigen::VectorXd CentredTimes(const touches::Observations& o, int k) {
 
 RoundSpeed FindRoundSpeed(const touches::Observations& o) {
   std::vector<RoundsOfPose> poses(o.poses);
-  std::vector<int> repeats(o.poses, 0), round_of(o.size(), -1), rounds;
+  const std::vector<int> round_of = touches::RoundsOfTouches(o);
+  std::vector<int> rounds;
   for (int k = 0; k < o.size(); ++k) {
     const int pose = o.pose[k];
-    const int round = o.set->round.empty() ? repeats[pose]++ : o.set->round[o.row[k]];
-    round_of[k] = round;
+    const int round = round_of[k];
     const Eigen::VectorXd contrasts = CentredTimes(o, k);
     if (!o.used[k] || !contrasts.allFinite()) continue;
     poses[pose].emplace(round, contrasts);
     if (std::find(rounds.begin(), rounds.end(), round) == rounds.end()) rounds.push_back(round);
   }
-  if (static_cast<int>(rounds.size()) < kFewestRounds || static_cast<int>(rounds.size()) > kMostRounds)
+  if (static_cast<int>(rounds.size()) < kMinComparedRounds ||
+      static_cast<int>(rounds.size()) > kMaxComparedRounds)
     return {};
 
   const auto without = [&rounds](std::initializer_list<int> left_out) {

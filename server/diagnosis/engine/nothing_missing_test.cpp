@@ -30,7 +30,7 @@ LinearHypotheses Hypotheses() {
   return hypotheses;
 }
 
-NothingMissing Judge(const LinearHypotheses& hypotheses, const Eigen::VectorXd& data, uint64_t index) {
+NothingMissing Assess(const LinearHypotheses& hypotheses, const Eigen::VectorXd& data, uint64_t index) {
   Eigen::MatrixXd residuals(kReadings, kDraws + 1);
   residuals.col(0) = data;
   residuals.rightCols(kDraws) = Normal(kReadings, kDraws, index);
@@ -44,7 +44,7 @@ TEST(NothingMissing, IsUniformWhereNothingIs) {
   constexpr int kSets = 500;
   for (int set = 0; set < kSets; ++set)
     // The size of the noise does not matter.
-    p.push_back(Judge(hypotheses, 3 * Normal(kReadings, 1, 1000 + 2 * set), 1001 + 2 * set).p);
+    p.push_back(Assess(hypotheses, 3 * Normal(kReadings, 1, 1000 + 2 * set), 1001 + 2 * set).p);
   std::sort(p.begin(), p.end());
   double distance = 0;
   for (int i = 0; i < kSets; ++i)
@@ -57,8 +57,8 @@ TEST(NothingMissing, IsSmallWhereOneEffectIs) {
   const LinearHypotheses hypotheses = Hypotheses();
   const Eigen::VectorXd noise = Normal(kReadings, 1, 90);
   const Eigen::VectorXd effect = Normal(kReadings, 12, 1).col(3) + 2 * Normal(kReadings, 1, 2);
-  EXPECT_LT(Judge(hypotheses, noise + 3 * effect, 91).p, 1e-6);
-  EXPECT_EQ(Judge(hypotheses, noise, 92).hypotheses, 14);
+  EXPECT_LT(Assess(hypotheses, noise + 3 * effect, 91).p, 1e-6);
+  EXPECT_EQ(Assess(hypotheses, noise, 92).hypotheses, 14);
 }
 
 // One row in sixty is explained exactly by chance hardly ever; p of F(1, 59) at t = 3 is 0.0039.

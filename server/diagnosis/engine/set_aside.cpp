@@ -68,26 +68,26 @@ std::string SharedGroups(const std::vector<char>& aside, const std::vector<Divis
 
 }  // namespace
 
-SetAside JudgeSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
-                       double noise, const std::string& plural) {
-  SetAside judged;
-  judged.of = static_cast<int>(aside.size());
-  judged.count = static_cast<int>(std::count(aside.begin(), aside.end(), 1));
-  if (judged.count == 0) return judged;
-  const double share = static_cast<double>(judged.count) / judged.of;
-  judged.words = absl::StrFormat(
+SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
+                        double noise, const std::string& plural) {
+  SetAside assessed;
+  assessed.of = static_cast<int>(aside.size());
+  assessed.count = static_cast<int>(std::count(aside.begin(), aside.end(), 1));
+  if (assessed.count == 0) return assessed;
+  const double share = static_cast<double>(assessed.count) / assessed.of;
+  assessed.words = absl::StrFormat(
       "%d of %d %s (%.2g %%) were set aside, since the noise of the others does not "
       "explain them",
-      judged.count, judged.of, plural, 100 * share);
+      assessed.count, assessed.of, plural, 100 * share);
   const std::string shared = SharedGroups(aside, divisions);
-  const double neighbours_p = NeighboursP(aside, judged.count);
+  const double neighbours_p = NeighboursP(aside, assessed.count);
   const bool grouped = !shared.empty(), neighbours = neighbours_p < kTogetherP;
-  judged.is_finding =
+  assessed.is_finding =
       share > kFewShare || grouped || neighbours || (noise > 0 && rmse > kFarAboveNoise * noise);
-  absl::StrAppend(&judged.words, grouped ? "; " + shared : "",
+  absl::StrAppend(&assessed.words, grouped ? "; " + shared : "",
                   neighbours ? grouped ? ", and they follow one another" : "; they follow one another" : "",
                   !grouped && !neighbours ? "; nothing that they share was found" : "", ".");
-  return judged;
+  return assessed;
 }
 
 }  // namespace touchstone::diagnosis::engine

@@ -1,4 +1,4 @@
-// What a fit set aside because its noise does not explain it, judged: it may be a few gross errors, or the part of the data
+// What a fit set aside because its noise does not explain it, assessed: it may be a few gross errors, or the part of the data
 // that shows what is missing.
 #pragma once
 
@@ -22,7 +22,7 @@ struct SetAside {
 
 // `aside[i]`: measurement i, in the order in which they were made. `rmse`: of all measurements, those set aside included;
 // `noise`: what no model can go below, in the same unit. `plural`: "touches".
-SetAside JudgeSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
-                       double noise, const std::string& plural);
+SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
+                        double noise, const std::string& plural);
 
 }  // namespace touchstone::diagnosis::engine

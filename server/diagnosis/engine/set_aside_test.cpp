@@ -23,41 +23,41 @@ std::vector<char> Aside(const std::vector<int>& which) {
   return aside;
 }
 
-SetAside Judge(const std::vector<int>& which, double rmse = 5) {
-  return JudgeSetAside(Aside(which), {ObjectsByTurns()}, rmse, 5, "touches");
+SetAside Assess(const std::vector<int>& which, double rmse = 5) {
+  return AssessSetAside(Aside(which), {ObjectsByTurns()}, rmse, 5, "touches");
 }
 
 TEST(SetAside, SaysNothingOfNone) {
-  EXPECT_FALSE(Judge({}, 500).is_finding);
-  EXPECT_EQ(Judge({}).words, "");
+  EXPECT_FALSE(Assess({}, 500).is_finding);
+  EXPECT_EQ(Assess({}).words, "");
 }
 
 TEST(SetAside, TakesAFewSpreadOnesForGrossErrors) {
-  const SetAside judged = Judge({17, 302, 511, 730, 991});
-  EXPECT_FALSE(judged.is_finding);
-  EXPECT_THAT(judged.words, HasSubstr("5 of 1000 touches (0.5 %)"));
-  EXPECT_THAT(judged.words, HasSubstr("nothing that they share"));
+  const SetAside assessed = Assess({17, 302, 511, 730, 991});
+  EXPECT_FALSE(assessed.is_finding);
+  EXPECT_THAT(assessed.words, HasSubstr("5 of 1000 touches (0.5 %)"));
+  EXPECT_THAT(assessed.words, HasSubstr("nothing that they share"));
 }
 
 TEST(SetAside, TakesMoreThanOneInAHundredForAFinding) {
-  EXPECT_TRUE(Judge({10, 91, 172, 253, 334, 415, 496, 577, 658, 739, 820}).is_finding);
+  EXPECT_TRUE(Assess({10, 91, 172, 253, 334, 415, 496, 577, 658, 739, 820}).is_finding);
 }
 
 TEST(SetAside, NamesTheGroupThatTheyShare) {
-  const SetAside judged = Judge({1, 101, 205, 313, 405, 521, 633, 745});
-  EXPECT_TRUE(judged.is_finding);
-  EXPECT_THAT(judged.words, HasSubstr("8 of them are of b"));
+  const SetAside assessed = Assess({1, 101, 205, 313, 405, 521, 633, 745});
+  EXPECT_TRUE(assessed.is_finding);
+  EXPECT_THAT(assessed.words, HasSubstr("8 of them are of b"));
 }
 
 TEST(SetAside, SeesThatTheyFollowOneAnother) {
-  const SetAside judged = Judge({400, 401, 402, 403});
-  EXPECT_TRUE(judged.is_finding);
-  EXPECT_THAT(judged.words, HasSubstr("follow one another"));
+  const SetAside assessed = Assess({400, 401, 402, 403});
+  EXPECT_TRUE(assessed.is_finding);
+  EXPECT_THAT(assessed.words, HasSubstr("follow one another"));
 }
 
 TEST(SetAside, ForbidsAnErrorFarAboveTheNoise) {
-  EXPECT_FALSE(Judge({17, 302}, 6.4).is_finding);
-  EXPECT_TRUE(Judge({17, 302}, 6.6).is_finding);
+  EXPECT_FALSE(Assess({17, 302}, 6.4).is_finding);
+  EXPECT_TRUE(Assess({17, 302}, 6.6).is_finding);
 }
 
 // By chance alone: p 0.001 for what they share and for neighbours.
@@ -70,7 +70,7 @@ TEST(SetAside, IsSeldomMistakenByChance) {
       state = state * 6364136223846793005ull + 1442695040888963407ull;
       which.push_back(static_cast<int>((state >> 33) % kMeasurements));
     }
-    findings += Judge(which).is_finding;
+    findings += Assess(which).is_finding;
   }
   EXPECT_LE(findings, 4);
 }

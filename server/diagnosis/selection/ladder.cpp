@@ -53,13 +53,9 @@ absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit
 // The error as a comparison finds it; the held-out error keeps its ratio to the fit's.
 absl::Status SetErrors(const Workspace& workspace, const engine::Fit& fit,
                        engine::RankedCandidate* candidate) {
-  const double fitted = std::sqrt(fit.columns.values.col(0).squaredNorm() /
-                                  std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  engine::Quality quality = {fitted, engine::HeldOutRmse(workspace.experiment, fit), 0};
-  TOUCHSTONE_ASSIGN_OR_RETURN(const double rmse_s, ErrorAsCompared(workspace, fit.model.base()));
-  SetError(rmse_s, &quality);
-  candidate->rmse = quality.rmse;
-  candidate->heldout_rmse = std::max(quality.heldout_rmse, quality.rmse);
+  TOUCHSTONE_ASSIGN_OR_RETURN(candidate->rmse, ErrorAsCompared(workspace, fit.model.base()));
+  candidate->heldout_rmse =
+      candidate->rmse * HeldOutRatio(fit, engine::HeldOutRmse(workspace.experiment, fit));
   return absl::OkStatus();
 }
 
@@ -101,8 +97,8 @@ class LadderBuilder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const double final_s, ErrorAsCompared(workspace_, ladder_.improved));
     SetError(final_s, &ladder_.final);
     if (ladder_.steps.empty() && ladder_.values_wrong && ladder_.final.rmse > before_.rmse) KeepGiven();
-    ladder_.set_aside = JudgeTouchesSetAside(*workspace_.observations, ladder_.residuals, ladder_.final.rmse,
-                                             ladder_.noise_floor.sigma);
+    ladder_.set_aside = AssessTouchesSetAside(*workspace_.observations, ladder_.residuals, ladder_.final.rmse,
+                                              ladder_.noise_floor.sigma);
     TOUCHSTONE_RETURN_IF_ERROR(JudgeSurface());
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.

@@ -12,14 +12,6 @@ namespace {
 
 constexpr double kMinDegreesOfFreedom = 8;
 
-// Held-out error over error, on the touches of the search. By least squares it is at least 1; weights that differ between
-// the two must not make it less.
-double RatioOf(const engine::Fit& fit, double heldout_rmse_s) {
-  const double rmse_s = std::sqrt(fit.columns.values.col(0).squaredNorm() /
-                                  std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
-  return rmse_s > 0 ? std::max(heldout_rmse_s / rmse_s, 1.0) : 1;
-}
-
 // Without repeats: how much better a smooth remainder explains the residuals than none.
 double SmoothRemainderP(const Workspace& workspace, const engine::Fit& fit) {
   const double gain = std::max(SurfaceErrorNats(workspace, fit), 0.0);
@@ -27,6 +19,12 @@ double SmoothRemainderP(const Workspace& workspace, const engine::Fit& fit) {
 }
 
 }  // namespace
+
+double HeldOutRatio(const engine::Fit& fit, double heldout_rmse_s) {
+  const double rmse_s = std::sqrt(fit.columns.values.col(0).squaredNorm() /
+                                  std::max<double>(1, static_cast<double>(fit.columns.values.rows())));
+  return rmse_s > 0 ? std::max(heldout_rmse_s / rmse_s, 1.0) : 1;
+}
 
 double RoundingS(const touches::Observations& o) {
   double squares = 0, count = 0;
@@ -57,7 +55,7 @@ absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engi
   quality.rmse = touches::Rmse(o, residuals);
   TOUCHSTONE_ASSIGN_OR_RETURN(const double heldout_rmse_s,
                               engine::HeldOutRmseRefitted(workspace.experiment, fit));
-  quality.heldout_rmse = quality.rmse * RatioOf(fit, heldout_rmse_s);
+  quality.heldout_rmse = quality.rmse * HeldOutRatio(fit, heldout_rmse_s);
   quality.lack_of_fit_p = HasRepeats(PureErrorOf(o, residuals)) ? LackOfFitP(o, residuals, fit.model.size())
                                                                 : SmoothRemainderP(workspace, fit);
   return quality;
@@ -102,7 +100,7 @@ engine::Quality QualityWithoutSurface(const Workspace& workspace, const engine::
       workspace.likelihood->hypotheses()[fit.hypothesis].effective_dof + fit.model.size();
   const touches::SumOfSquares total = touches::TotalSquares(*workspace.searched, left);
   quality.rmse = std::sqrt(total.sum_of_squares / std::max(total.degrees_of_freedom - effective_dof, 1.0));
-  quality.heldout_rmse = quality.rmse * RatioOf(fit, engine::HeldOutRmse(workspace.experiment, fit));
+  quality.heldout_rmse = quality.rmse * HeldOutRatio(fit, engine::HeldOutRmse(workspace.experiment, fit));
   quality.lack_of_fit_p = LackOfFitP(*workspace.searched, left, effective_dof);
   return quality;
 }

@@ -17,6 +17,10 @@ double LackOfFitP(const touches::Observations& observations, const std::vector<d
 // Repeats enough for an F test.
 bool HasRepeats(const touches::SumOfSquares& error);
 
+// Held-out error over error of a fit, on the touches of the search. By least squares it is at least 1; weights that differ
+// between the two must not make it less.
+double HeldOutRatio(const engine::Fit& fit, double heldout_rmse_s);
+
 // Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
 // comes from the touches of the search, with every value fitted anew (inference/held_out.h).
 absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engine::Fit& fit,

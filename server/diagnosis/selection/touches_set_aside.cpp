@@ -29,8 +29,8 @@ int FaceOf(const Eigen::Vector3d& approach) {
 
 }  // namespace
 
-engine::SetAside JudgeTouchesSetAside(const touches::Observations& o, const std::vector<double>& residuals,
-                                      double rmse_s, double noise_s) {
+engine::SetAside AssessTouchesSetAside(const touches::Observations& o, const std::vector<double>& residuals,
+                                       double rmse_s, double noise_s) {
   std::vector<char> outlier(o.size(), 0), aside;
   for (const int k : o.outliers) outlier[k] = 1;
   Division objects, rounds,
@@ -41,10 +41,10 @@ engine::SetAside JudgeTouchesSetAside(const touches::Observations& o, const std:
   for (const std::string& object : o.objects) objects.groups.push_back("of " + object);
   for (int i = 0; i < o.fingers; ++i)
     fingers.groups.push_back(absl::StrCat("off most by finger ", model::FingerName(i, o.fingers)));
-  std::vector<int> repeats(o.poses, 0);
+  const std::vector<int> round_of = touches::RoundsOfTouches(o);
   for (int k = 0; k < o.size(); ++k) {
-    const int round = o.set->round.empty() ? repeats[o.pose[k]]++ : o.set->round[o.row[k]];
     if (!o.used[k] && !outlier[k]) continue;
+    const int round = round_of[k];
     aside.push_back(outlier[k]);
     objects.group.push_back(o.object[k]);
     while (static_cast<int>(rounds.groups.size()) <= round)
@@ -54,7 +54,7 @@ engine::SetAside JudgeTouchesSetAside(const touches::Observations& o, const std:
     faces.group.push_back(face % 2 == 1 ? face - 1 : face + 1);
     fingers.group.push_back(LargestOf(&residuals[static_cast<size_t>(k) * o.fingers], o.fingers));
   }
-  return engine::JudgeSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches");
+  return engine::AssessSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches");
 }
 
 }  // namespace touchstone::diagnosis::selection

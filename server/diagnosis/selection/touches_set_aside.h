@@ -7,7 +7,7 @@
 namespace touchstone::diagnosis::selection {
 
 // `residuals` [k * fingers + i], s; `rmse_s`: of all touches that a comparison uses; `noise_s`: the noise floor.
-engine::SetAside JudgeTouchesSetAside(const touches::Observations& observations,
-                                      const std::vector<double>& residuals, double rmse_s, double noise_s);
+engine::SetAside AssessTouchesSetAside(const touches::Observations& observations,
+                                       const std::vector<double>& residuals, double rmse_s, double noise_s);
 
 }  // namespace touchstone::diagnosis::selection

@@ -110,6 +110,13 @@ absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
   return o;
 }
 
+std::vector<int> RoundsOfTouches(const Observations& o) {
+  std::vector<int> rounds(o.size()), repeats(o.poses, 0);
+  for (int k = 0; k < o.size(); ++k)
+    rounds[k] = o.set->round.empty() ? repeats[o.pose[k]]++ : o.set->round[o.row[k]];
+  return rounds;
+}
+
 void LeaveOut(Observations* observations, int k, const std::string& reason) {
   if (!observations->used[k]) return;
   observations->used[k] = 0;

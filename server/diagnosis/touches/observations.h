@@ -44,6 +44,9 @@ absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input);
 // Time since the session's previous touch; 0 for the first and without session times.
 double PauseS(const Observations& observations, int k);
 
+// The round of each touch: as the set numbers it, else how often its pose came before. [k]
+std::vector<int> RoundsOfTouches(const Observations& observations);
+
 // The reason of touches with a finger whose time no noise explains.
 inline constexpr char kOutlierReason[] =
     "an outlier: one finger's time is far from what all other touches allow";
