@@ -100,12 +100,15 @@ absl::Status CheckAnyValue(const ModelOptions& options) {
   if (!options.assignments.empty()) return absl::OkStatus();
   const std::shared_ptr<const model::Effect> effect = effects::Catalogue().Find(options.effect);
   if (effect == nullptr || effect->parameters.empty()) return absl::OkStatus();
+  // Typical sizes are in the unit of files; those of several numbers are shown by `touchstone effects`.
   std::vector<std::string> examples;
   for (const model::ParameterInfo& parameter : effect->parameters)
-    examples.push_back(absl::StrCat(parameter.name, "=", FileNumber(parameter.unit, parameter.typical)));
-  return absl::InvalidArgumentError(absl::StrCat(
-      "'", options.effect, "' without a value changes nothing; its size was expected, for instance ",
-      absl::StrJoin(examples, " ")));
+    if (parameter.arity == model::Arity::kScalar)
+      examples.push_back(absl::StrCat(parameter.name, "=", ShortestNumber(parameter.typical)));
+  return absl::InvalidArgumentError(
+      absl::StrCat("'", options.effect, "' without a value changes nothing; its size was expected",
+                   examples.empty() ? "" : ", for instance ", absl::StrJoin(examples, " "),
+                   " (touchstone effects ", options.effect, " tells more)"));
 }
 
 absl::Status RunAdd(const Cli& cli, const ModelOptions& options) {

@@ -51,7 +51,7 @@ TEST_F(UsageErrorTest, BadInputIsExitCode2AndNamesFieldAndValue) {
       {{"stream", "--out", "d", "--rounds", "3"}, "--rounds belongs to --plan faces"},
       {{"stream", "--out", "d", "--samples", "0"}, "--samples: 0 is out of range; 1 or more was expected"},
       {{"model", "add", "nominal", "tip_radius", "-o", "tips.yaml"},
-       "'tip_radius' without a value changes nothing; its size was expected, for instance radius_mm="},
+       "'tip_radius' without a value changes nothing; its size was expected, for instance radius_mm=1.5 "},
       {{"stream", "--out", "d", "--image", "0x5"}, "--image: '0x5' is no size"},
       {{"stream", "--out", "d", "--image", "20000x20000"}, "20000"},
       {{"stream", "--out", "d", "--shards", "4/4"}, "--shards: '4/4'"},
