@@ -157,5 +157,38 @@ TEST(HonestReport, SaysThatAPartOfTheTimesWasReadInTicks) {
   EXPECT_LT(*diagnosis.p_nothing_missing, 1e-6);
 }
 
+// An effect of one round is neither one of all touches, nor noise, nor the speed of that round.
+TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuch) {
+  touches::HiddenRig rig;
+  rig.rounds = 4;
+  const DiagnosisInput right = touches::MakeTestInput(rig);
+  rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}};
+  const DiagnosisInput slipped = touches::MakeTestInput(rig);
+  const report::Diagnosis diagnosis = Diagnosed(Spoilt(right, [&](session::MeasurementSet* set) {
+    for (int row = 0; row < set->size(); ++row)
+      if (row / 24 % 4 == 2)
+        for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = slipped.set->time_s[row * 3 + i];
+  }));
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
+  EXPECT_TRUE(diagnosis.steps.empty());
+  ASSERT_TRUE(diagnosis.data[0].unexplained.has_value());
+  const engine::UnexplainedRest& rest = *diagnosis.data[0].unexplained;
+  EXPECT_THAT(rest.words, HasSubstr("in round 2: oblique_slip differs there by travel_mm +0."));
+  EXPECT_EQ(rest.covariates[0].name, "round");
+}
+
+TEST(HonestReport, ARoundAtAnotherSpeedIsAMistakeOfTheFile) {
+  touches::HiddenRig rig;
+  rig.rounds = 4;
+  const report::Diagnosis diagnosis = Diagnosed(Spoilt(touches::MakeTestInput(rig), [](auto* set) {
+    for (int row = 0; row < set->size(); ++row)
+      if (row / 24 % 4 == 2)
+        for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] /= 1.05;
+  }));
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kCheckData);
+  ASSERT_EQ(diagnosis.data_problems.size(), 1u);
+  EXPECT_EQ(diagnosis.data_problems[0].kind, engine::ProblemKind::kSpeedFactor);
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis

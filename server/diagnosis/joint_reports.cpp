@@ -56,8 +56,9 @@ class JointDiagnoser {
   }
 
   absl::StatusOr<report::Diagnosis> Run() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::DataProblem> problems,
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<engine::DataProblem> problems,
                                 checks::FindDataProblems(touches_, Stretch(context_, 0, 0.05)));
+    if (problems.empty()) problems = checks::FindRoundAtAnotherSpeed(touches_, context_.pool);
     parts_.model_name = input_.model->name;
     parts_.model_hash = input_.model->Hash();
     TOUCHSTONE_RETURN_IF_ERROR(Measure(*input_.model, &parts_.initial));

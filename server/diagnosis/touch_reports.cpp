@@ -23,6 +23,7 @@
 #include "server/diagnosis/selection/ladder.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -145,6 +146,21 @@ absl::StatusOr<report::Diagnosis> DiagnosePoseFree(const DiagnosisInput& input,
   return report::FromDistributions(input, std::move(comparison));
 }
 
+// Whether what differs in a part of the session may be the speed of the arm there.
+bool SpeedSaysTheSame(const selection::GroupDifference& group) {
+  constexpr char kSpeed[] = "speed_error";
+  std::vector<std::string> names = group.also;
+  names.push_back(group.effect);
+  const auto is_named = [&names](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  for (const auto& effect : effects::TouchEffects())
+    if (effect->name == kSpeed)
+      return is_named(kSpeed) || std::any_of(effect->confounded_with.begin(), effect->confounded_with.end(),
+                                             [&](const auto& other) { return is_named(other.effect); });
+  return false;
+}
+
 // `always`: Propose, which names touches even where nothing is confounded.
 absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max_touches, bool always,
                                             const DiagnosisContext& context) {
@@ -155,11 +171,12 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::DataProblem> problems,
                               checks::FindDataProblems(input, gated));
-  if (!problems.empty()) {
-    report::Diagnosis diagnosis = CheckDataReport(input, gated, problems);
+  const auto check_data = [&](const std::vector<engine::DataProblem>& found) {
+    report::Diagnosis diagnosis = CheckDataReport(input, gated, found);
     diagnosis.duration_s = Now() - began;
     return diagnosis;
-  }
+  };
+  if (!problems.empty()) return check_data(problems);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
                               selection::MakeWorkspace(input, gated));
   workspace->experiment.cancelled = [&gate] { return !gate.Continue(); };
@@ -176,6 +193,10 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   const double compared_s = touches::Rmse(o, touches::Residuals(o, workspace->nominal));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection::SelectionResult selection,
                               selection::SelectExplanation(workspace.get()));
+  if (!selection.group || SpeedSaysTheSame(*selection.group)) {
+    const std::vector<engine::DataProblem> of_round = checks::FindRoundAtAnotherSpeed(input, context.pool);
+    if (!of_round.empty()) return check_data(of_round);
+  }
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
@@ -188,11 +209,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
     std::vector<int> rows;
     for (const int k : o.outliers) rows.push_back(o.row[k]);
     const std::vector<engine::DataProblem> of_rows = checks::FindProblemsOfRows(input, rows, context.pool);
-    if (!of_rows.empty()) {
-      report::Diagnosis check_data = CheckDataReport(input, gated, of_rows);
-      check_data.duration_s = Now() - began;
-      return check_data;
-    }
+    if (!of_rows.empty()) return check_data(of_rows);
   }
   report::AddLadder(ladder, &diagnosis);
   diagnosis.p_nothing_missing = selection.nothing_missing.p;

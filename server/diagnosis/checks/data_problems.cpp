@@ -320,8 +320,15 @@ absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const Diagnosi
     const absl::Status looked = LookForMistakes(input, context, trial, *before, &problems);
     if (!looked.ok()) return looked;
   }
-  if (problems.empty()) problems.AddRoundSpeed(*o);
   problems.AddDuplicates(*o);
+  return problems.Take();
+}
+
+std::vector<engine::DataProblem> FindRoundAtAnotherSpeed(const DiagnosisInput& input, ThreadPool* pool) {
+  const absl::StatusOr<touches::Observations> o = touches::MakeObservations(input);
+  if (!o.ok() || !input.set->has_poses) return {};
+  ProblemList problems(input, pool);
+  problems.AddRoundSpeed(*o);
   return problems.Take();
 }
 

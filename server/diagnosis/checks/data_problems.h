@@ -30,7 +30,11 @@ namespace touchstone::diagnosis::checks {
 absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const DiagnosisInput& input,
                                                                   const DiagnosisContext& context);
 
-// The same for rows that a fit has set aside: the mistakes that explain these rows alone, the others being right.
+// A round at another speed than the file says (round_speed.h). Physics that acts in one round only may look like it, so it is
+// asked for once the model's effects have had their turn.
+std::vector<engine::DataProblem> FindRoundAtAnotherSpeed(const DiagnosisInput& input, ThreadPool* pool);
+
+// The mistakes in rows that a fit has set aside: those that explain these rows alone, the others being right.
 std::vector<engine::DataProblem> FindProblemsOfRows(const DiagnosisInput& input, const std::vector<int>& rows,
                                                     ThreadPool* pool);
 

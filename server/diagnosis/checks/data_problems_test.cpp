@@ -230,13 +230,16 @@ TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
   rig.rounds = 4;
   rig.sigma_us = 2000;
   const DiagnosisInput right = MakeFile(rig);
-  EXPECT_TRUE(ProblemsOf(right).empty());
+  EXPECT_TRUE(FindRoundAtAnotherSpeed(right, nullptr).empty());
   const auto at_factor = [&](double factor, int round) {
-    return ProblemsOf(Spoilt(right, [&](MeasurementSet* set) {
-      for (int row = 0; row < set->size(); ++row)
-        if (row / 24 % 4 == round)
-          for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] /= factor;
-    }));
+    return FindRoundAtAnotherSpeed(Spoilt(right,
+                                          [&](MeasurementSet* set) {
+                                            for (int row = 0; row < set->size(); ++row)
+                                              if (row / 24 % 4 == round)
+                                                for (int i = 0; i < 3; ++i)
+                                                  set->time_s[row * 3 + i] /= factor;
+                                          }),
+                                   nullptr);
   };
   for (const double factor : {0.97, 1.03, 1.2}) {
     const auto problems = at_factor(factor, 2);

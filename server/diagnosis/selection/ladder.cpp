@@ -16,6 +16,7 @@
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/dropouts.h"
 #include "server/diagnosis/selection/round_structure.h"
+#include "server/diagnosis/selection/session_order.h"
 #include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
 #include "server/diagnosis/selection/touches_set_aside.h"
@@ -30,6 +31,8 @@ constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says 
 constexpr double kMisfitP = 1e-2;
 constexpr double kRoundsPossibleP =
     0.05;  // of agreement within rounds, for a doubt of what scatter looks like
+constexpr double kMaxAtTwoSpeeds =
+    0.5;  // probability of either of two effects that two speeds cannot tell from another
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
@@ -89,6 +92,7 @@ class LadderBuilder {
 
   absl::StatusOr<Ladder> Build() {
     DoubtUnusualValues(fit_, steps_, &ladder_);
+    DoubtTwoSpeeds();
     doubts_ = DoubtsOf(fit_, steps_, &ladder_);
     QuestionRounds();
     ticks_ = touches::FindTouchTicks(*workspace_.observations);
@@ -120,13 +124,16 @@ class LadderBuilder {
                                }));
     const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
                       selection_.partial || unplaced_ || doubts_.any() || ladder_.set_aside.is_finding ||
-                      ticks_.in_part();
+                      ticks_.in_part() || selection_.group;
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
                                   DescribeUnexplained(workspace_, selection_, ladder_.final,
                                                       ladder_.noise_floor.sigma, with_formula_));
       if (TimeStructureRemains() || Walks())
         NameTimeFirst(*workspace_.observations, ladder_.noise_floor, &*ladder_.unexplained);
+      if (selection_.group)
+        ladder_.unexplained->covariates.insert(ladder_.unexplained->covariates.begin(),
+                                               selection_.group->test);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
       engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), doubts_.any()), &ladder_.steps,
@@ -206,11 +213,45 @@ class LadderBuilder {
   absl::Status DescribeStep(const engine::OrderedStep& ordered) {
     engine::LadderStep step = engine::DescribeStep(fit_, fit_.covariance, *ordered.step);
     engine::AddConfounded(step, &ladder_.confounded);
+    AddOrder(ordered.step->effect, &step);
     step.model = ordered.whole ? ladder_.improved : ordered.fit.model.base();
     TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOfModel(workspace_, ordered.fit, step.model));
     climbed_.push_back(ordered.step->effect);
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
+  }
+
+  // Objects have sizes and places of their own; what belongs to the rig and differs between objects may differ in time.
+  void AddOrder(int effect, engine::LadderStep* step) const {
+    const model::EffectInstance& instance = saved_.model.base().effects[effect];
+    if (!instance.per_object || instance.effect->often_per_object) return;
+    const std::string words =
+        OrderInWords(*workspace_.observations, saved_.model.OnlyObject(effect), step->parameters);
+    if (!words.empty()) engine::AddWords(words, step);
+  }
+
+  // Two effects that two speeds cannot tell from a third dependence on the speed.
+  void DoubtTwoSpeeds() {
+    for (const auto& [one, other] : PairsAtTwoSpeeds(*workspace_.searched, TouchOfRow(), saved_, steps_)) {
+      const std::string names[] = {NameOfStep(one), NameOfStep(other)};
+      for (engine::LadderStep& step : ladder_.steps) {
+        if (step.effect != names[0] && step.effect != names[1]) continue;
+        engine::AddWords(absl::StrCat("At two speeds, whatever depends on the speed is some sum of ",
+                                      names[0], " and ", names[1], ": measure at a third one."),
+                         &step);
+        step.probability = std::min(step.probability, kMaxAtTwoSpeeds);
+      }
+    }
+  }
+  std::string NameOfStep(size_t step) const {
+    return engine::NameOf(*saved_.model.base().effects[steps_[step].effect].effect);
+  }
+  // The touch of each row of the search.
+  std::vector<int> TouchOfRow() const {
+    std::vector<int> touches;
+    for (const int t : workspace_.contrasts->touch_of_row())
+      touches.push_back(workspace_.contrasts->touches()[t]);
+    return touches;
   }
 
   const model::EffectInstance* GivenSurface() const {
@@ -273,6 +314,7 @@ class LadderBuilder {
   }
 
   std::string WordsOfRest() const {
+    if (selection_.group) return selection_.group->words;
     if (selection_.partial) return selection_.partial->words;
     if (Walks())
       return "The fingers wander through the whole session, and nothing shows that they come back: a walk, "

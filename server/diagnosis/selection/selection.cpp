@@ -10,6 +10,8 @@
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/declared_noise.h"
+#include "server/diagnosis/selection/effect_columns.h"
+#include "server/diagnosis/selection/group_difference.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
@@ -132,24 +134,10 @@ absl::Status FindCompetingEffects(SelectionResult* result) {
 }
 
 std::vector<double> ResidualsWithoutSurface(const Workspace& workspace, const engine::Fit& fit) {
-  const touches::Contrasts& contrasts = *workspace.contrasts;
-  const touches::Observations& o = *workspace.searched;
   const Eigen::VectorXd left =
       fit.columns.values.col(0) -
       workspace.likelihood->FieldMean(engine::Likelihood::Pick(fit.columns, {0}), fit.hypothesis);
-  std::vector<double> residuals(o.time_s.size(), NAN);
-  for (size_t t = 0; t < contrasts.touches().size(); ++t) {
-    const Eigen::MatrixXd& h = contrasts.MatrixOf(static_cast<int>(t));
-    const int first = contrasts.FirstRow(static_cast<int>(t));
-    for (int i = 0; i < o.fingers; ++i) {
-      if (!contrasts.TakesPart(static_cast<int>(t), i)) continue;
-      double sum = 0;
-      for (int row = 0; row < h.rows(); ++row) sum += h(row, i) * left[first + row];
-      residuals[static_cast<size_t>(contrasts.touches()[t]) * o.fingers + i] =
-          sum / contrasts.root_weights()[t];
-    }
-  }
-  return residuals;
+  return workspace.contrasts->PerFinger(left, workspace.searched->time_s.size());
 }
 
 double SurfaceErrorNats(const Workspace& workspace, const engine::Fit& fit) {
@@ -198,6 +186,14 @@ absl::StatusOr<bool> ReviseTouches(const engine::Fit& fit, const touches::NoiseF
   return true;
 }
 
+// What a part of the session has for itself says nothing of the rest.
+void LeaveOutRows(const GroupDifference& group, touches::Observations* o) {
+  std::vector<char> leaves(o->set->size(), 0);
+  for (const int row : group.rows) leaves[row] = 1;
+  for (int k = 0; k < o->size(); ++k)
+    if (leaves[o->row[k]]) touches::LeaveOut(o, k, absl::StrCat(group.part, ", where something was other"));
+}
+
 }  // namespace
 
 absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
@@ -208,16 +204,26 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (workspace->context.progress) workspace->context.progress(what, 0);
   };
   engine::NothingMissing nothing_missing;
+  std::optional<GroupDifference> group;
   for (int pass = 0; pass < kPasses; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
     result = SelectionResult();
     result.search = std::make_unique<engine::StepwiseSearch>(
         workspace->experiment, MakeCandidates(workspace->input, *workspace->searched), engine::SearchRules(),
         progress);
+    GivenAndEffects columns;
     if (pass == 0) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(nothing_missing, TestNothingMissing(*workspace, *result.search));
+      TOUCHSTONE_ASSIGN_OR_RETURN(columns, ColumnsOfEffects(*workspace, *result.search));
+      TOUCHSTONE_ASSIGN_OR_RETURN(nothing_missing, TestNothingMissing(*workspace, columns));
     }
     TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, &result));
+    if (pass == 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(group, FindGroupDifference(*workspace, columns, result));
+      if (group) {
+        LeaveOutRows(*group, workspace->observations.get());
+        continue;
+      }
+    }
     TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
     if (pass + 1 == kPasses) break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised,
@@ -225,6 +231,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (!revised) break;
   }
   result.nothing_missing = nothing_missing;
+  result.group = std::move(group);
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
   TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));

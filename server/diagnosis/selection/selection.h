@@ -28,6 +28,18 @@ struct SurfaceErrorFinding {
   double effective_dof = 0;
 };
 
+// A part of the session in which something was other than in the rest (group_difference.h).
+struct GroupDifference {
+  std::string effect;                           // of the catalogue, or of the given model
+  std::vector<std::string> also;                // effects that these data cannot tell from it
+  std::string part;                             // "in round 2"
+  std::vector<int> rows;                        // of the set, in that part
+  std::vector<engine::ParameterEstimate> more;  // by how much its values differ there from those in the rest
+  // That it depends on the round, or on the touch's place in the session; BIC, less the number of ways that were tried.
+  engine::CovariateTest test;
+  std::string words;  // sentences for people
+};
+
 struct SelectionResult {
   std::unique_ptr<engine::StepwiseSearch> search;  // the experiment that it works on belongs to the workspace
   engine::Fit initial_model;                       // as it was given
@@ -45,6 +57,7 @@ struct SelectionResult {
   touches::NoiseFindings noise;
   std::optional<NoiseMemory>
       memory;  // the wander that the residuals follow, where no curve describes them better
+  std::optional<GroupDifference> group;  // its touches are left out of the explanation
   std::optional<PartialOffset> partial;  // that a part of the touches has: no effect is named in its place
   SurfaceErrorFinding surface_error;
 };

@@ -38,24 +38,22 @@ model::Model WithoutDropouts(model::Model model) {
 
 class Tester {
  public:
-  Tester(const Workspace& workspace, const engine::StepwiseSearch& search)
+  Tester(const Workspace& workspace, const GivenAndEffects& columns)
       : workspace_(workspace),
-        search_(search),
+        given_(columns.given),
+        effects_(columns.effects),
         o_(*workspace.searched),
-        contrasts_(*workspace.contrasts),
-        initial_effects_(static_cast<int>(workspace.input.model->effects.size())) {}
+        contrasts_(*workspace.contrasts) {}
 
   absl::StatusOr<engine::NothingMissing> Run() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        fit_, engine::FitModel(workspace_.experiment,
-                               engine::Parameterization(*workspace_.input.model, o_.objects), 0));
-    TOUCHSTONE_RETURN_IF_ERROR(AddEffects());
+    AddEffects();
     TOUCHSTONE_ASSIGN_OR_RETURN(details_,
                                 workspace_.searched_predictor->Run(*workspace_.input.model, true, true));
     AddCurves();
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd residuals, DataAndDraws());
     // What is left is less than numbers are rounded to: it has no noise, and its pattern is that of rounding.
-    const double rms_s = std::sqrt(fit_.columns.values.col(0).squaredNorm() / std::max(contrasts_.rows(), 1));
+    const double rms_s =
+        std::sqrt(given_.columns.values.col(0).squaredNorm() / std::max(contrasts_.rows(), 1));
     if (rms_s < RoundingS(o_)) return engine::NothingMissing{1, hypotheses_.size()};
     // Data of a model without any noise agree to rounding: these do not.
     const auto& given = workspace_.input.model->effects;
@@ -72,32 +70,22 @@ class Tester {
   }
 
  private:
-  absl::Status AddEffects() {
-    std::map<std::string, Eigen::MatrixXd> of_effect;  // on all objects alike
-    const int own = fit_.model.size();
-    for (const engine::Extension& extension : search_.ListExtensions(fit_, initial_effects_)) {
-      const bool by_object = extension.candidate >= 0 && extension.start.size() > own &&
-                             !extension.start.parameters().back().object.empty();
-      const auto shared = of_effect.find(extension.name);
-      if (!by_object || shared == of_effect.end()) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
-                                    engine::Derivatives(workspace_.experiment, extension.start,
-                                                        extension.start.Start(), fit_.predicted, own));
-        hypotheses_.Add(columns);
-        if (extension.candidate >= 0 && !by_object) of_effect.emplace(extension.name, columns);
+  void AddEffects() {
+    for (const EffectColumns& effect : effects_) {
+      if (effect.shared < 0) {
+        hypotheses_.Add(effect.columns);
         continue;
       }
-      if (extension.object.empty()) {
-        hypotheses_.Add(OnEachObject(shared->second));
+      const Eigen::MatrixXd& columns = effects_[effect.shared].columns;
+      if (effect.extension.object.empty()) {
+        hypotheses_.Add(OnEachObject(columns));
         continue;
       }
-      const int object = static_cast<int>(std::find(o_.objects.begin(), o_.objects.end(), extension.object) -
-                                          o_.objects.begin());
+      const int object = static_cast<int>(
+          std::find(o_.objects.begin(), o_.objects.end(), effect.extension.object) - o_.objects.begin());
       const int first = contrasts_.FirstRowOfObject(object);
-      hypotheses_.Add(shared->second.middleRows(first, contrasts_.FirstRowOfObject(object + 1) - first),
-                      first);
+      hypotheses_.Add(columns.middleRows(first, contrasts_.FirstRowOfObject(object + 1) - first), first);
     }
-    return absl::OkStatus();
   }
 
   // A value per object.
@@ -150,7 +138,7 @@ class Tester {
     const bool shaped = HasShapedNoise(*workspace_.input.model);
     const int draws = shaped ? kSimulatedDraws : kDraws;
     Eigen::MatrixXd residuals(contrasts_.rows(), 1 + draws);
-    residuals.col(0) = fit_.columns.values.col(0);
+    residuals.col(0) = given_.columns.values.col(0);
     const model::Model drawn_from = WithoutDropouts(*workspace_.input.model);
     for (int draw = 1; draw <= draws; ++draw) {
       if (!shaped) {
@@ -230,11 +218,10 @@ class Tester {
   }
 
   const Workspace& workspace_;
-  const engine::StepwiseSearch& search_;
+  const engine::Fit& given_;
+  const std::vector<EffectColumns>& effects_;
   const touches::Observations& o_;
   const touches::Contrasts& contrasts_;
-  const int initial_effects_;
-  engine::Fit fit_;  // the model as it was given
   touches::Prediction details_;
   engine::LinearHypotheses hypotheses_;
 };
@@ -242,8 +229,8 @@ class Tester {
 }  // namespace
 
 absl::StatusOr<engine::NothingMissing> TestNothingMissing(const Workspace& workspace,
-                                                          const engine::StepwiseSearch& search) {
-  return Tester(workspace, search).Run();
+                                                          const GivenAndEffects& columns) {
+  return Tester(workspace, columns).Run();
 }
 
 }  // namespace touchstone::diagnosis::selection

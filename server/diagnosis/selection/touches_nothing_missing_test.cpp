@@ -19,7 +19,9 @@ engine::NothingMissing TestOf(const touches::HiddenRig& rig) {
   const engine::StepwiseSearch search((*workspace)->experiment,
                                       MakeCandidates((*workspace)->input, *(*workspace)->searched),
                                       engine::SearchRules(), [](const std::string&) {});
-  const absl::StatusOr<engine::NothingMissing> test = TestNothingMissing(**workspace, search);
+  const absl::StatusOr<GivenAndEffects> columns = ColumnsOfEffects(**workspace, search);
+  EXPECT_TRUE(columns.ok()) << columns.status();
+  const absl::StatusOr<engine::NothingMissing> test = TestNothingMissing(**workspace, *columns);
   EXPECT_TRUE(test.ok()) << test.status();
   return test.ok() ? *test : engine::NothingMissing();
 }

@@ -73,4 +73,18 @@ Eigen::VectorXd Contrasts::Apply(const std::vector<double>& per_finger) const {
   return result;
 }
 
+std::vector<double> Contrasts::PerFinger(const Eigen::VectorXd& rows, size_t size) const {
+  std::vector<double> values(size, NAN);
+  for (size_t t = 0; t < touches_.size(); ++t) {
+    const Eigen::MatrixXd& h = matrices_[mask_[t]];
+    for (int i = 0; i < fingers_; ++i) {
+      if (!TakesPart(static_cast<int>(t), i)) continue;
+      double sum = 0;
+      for (int row = 0; row < h.rows(); ++row) sum += h(row, i) * rows[first_row_[t] + row];
+      values[static_cast<size_t>(touches_[t]) * fingers_ + i] = sum / root_weight_[t];
+    }
+  }
+  return values;
+}
+
 }  // namespace touchstone::diagnosis::touches

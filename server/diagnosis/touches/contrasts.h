@@ -34,6 +34,8 @@ class Contrasts {
 
   // Contrasts of one value per finger. Entries of fingers that take no part are not read.
   Eigen::VectorXd Apply(const std::vector<double>& per_finger) const;
+  // The other way: values of mean 0 over each touch's fingers, [k * fingers + i] of `size` entries; NaN elsewhere.
+  std::vector<double> PerFinger(const Eigen::VectorXd& rows, size_t size) const;
 
  private:
   int fingers_;

@@ -1,0 +1,32 @@
+// What each effect that may be missing would change, to first order.
+#pragma once
+
+#include <vector>
+
+#include <absl/status/statusor.h>
+#include <Eigen/Core>
+
+#include "server/diagnosis/engine/stepwise_search.h"
+#include "server/diagnosis/selection/workspace.h"
+
+namespace touchstone::diagnosis::selection {
+
+struct EffectColumns {
+  engine::Extension extension;
+  Eigen::MatrixXd
+      columns;  // rows x its values: derivatives of the predicted rows; empty where `shared` is not -1
+  // Of an effect that acts on objects one by one: where the same effect on all of them stands, which has its columns.
+  int shared = -1;
+};
+
+// The given model, and every way to extend it that a search tries.
+struct GivenAndEffects {
+  engine::Fit given;
+  std::vector<EffectColumns> effects;
+};
+
+// On the touches of the search.
+absl::StatusOr<GivenAndEffects> ColumnsOfEffects(const Workspace& workspace,
+                                                 const engine::StepwiseSearch& search);
+
+}  // namespace touchstone::diagnosis::selection

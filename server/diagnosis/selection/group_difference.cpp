@@ -1,0 +1,382 @@
+#include "server/diagnosis/selection/group_difference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include "server/base/decompositions.h"
+#include "server/base/distributions.h"
+#include "server/base/random.h"
+#include "server/base/readable_time.h"
+#include "server/base/status.h"
+#include "server/diagnosis/selection/round_structure.h"
+#include "server/diagnosis/selection/session_parts.h"
+#include "server/diagnosis/selection/time_structure.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr double kDifferenceP = 1e-5;  // by chance, over all that is tried
+constexpr double kAheadNats = 6;       // of what else explains what repeats differ by
+constexpr double kSameNats = 3;        // explanations as near as this are named together
+constexpr double kMinRepeatDegrees = 40;
+constexpr double kLeastSquares = 1e-300;
+constexpr int kOrders = 199;
+constexpr int kSteps = 4;           // of Gauss and Newton
+constexpr double kVisible = 1e-6;   // share of a column's square that differs within poses
+constexpr double kClearErrors = 3;  // of a value that is worth a word
+constexpr size_t kMaxPartsNamed = 2, kMaxAlso = 3;
+
+// Residuals and columns of repeats, each less its mean over the touches of its pose.
+class Repeats {
+ public:
+  explicit Repeats(const Workspace& workspace) : contrasts_(*workspace.contrasts) {
+    const touches::Observations& o = *workspace.searched;
+    std::map<std::pair<int, int>, std::vector<int>> cells;  // by pose and fingers
+    for (int t = 0; t < touches(); ++t) {
+      int fingers = 0;
+      for (int i = 0; i < o.fingers; ++i) fingers |= contrasts_.TakesPart(t, i) << i;
+      cells[{o.pose[contrasts_.touches()[t]], fingers}].push_back(t);
+    }
+    for (auto& [key, members] : cells) {
+      if (members.size() < 2) continue;
+      degrees_ += static_cast<double>((members.size() - 1) * RowsOf(members[0]));
+      cells_.push_back(std::move(members));
+    }
+  }
+
+  double degrees() const { return degrees_; }
+  int touches() const { return static_cast<int>(contrasts_.touches().size()); }
+
+  // Rows without repeats are 0.
+  Eigen::MatrixXd Centred(const Eigen::MatrixXd& rows) const {
+    Eigen::MatrixXd centred = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
+    for (const std::vector<int>& cell : cells_) {
+      const int height = RowsOf(cell[0]);
+      Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(height, rows.cols());
+      for (const int t : cell) mean += rows.middleRows(contrasts_.FirstRow(t), height) / cell.size();
+      for (const int t : cell)
+        centred.middleRows(contrasts_.FirstRow(t), height) =
+            rows.middleRows(contrasts_.FirstRow(t), height) - mean;
+    }
+    return centred;
+  }
+
+  // The rows of touches that `has` names [t], 0 elsewhere.
+  Eigen::MatrixXd Only(const Eigen::MatrixXd& rows, const std::vector<char>& has) const {
+    Eigen::MatrixXd only = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
+    for (int t = 0; t < touches(); ++t)
+      if (has[t])
+        only.middleRows(contrasts_.FirstRow(t), RowsOf(t)) =
+            rows.middleRows(contrasts_.FirstRow(t), RowsOf(t));
+    return only;
+  }
+
+  // With the touches of each pose in another order.
+  Eigen::VectorXd Shuffled(const Eigen::VectorXd& rows, RandomStream* random) const {
+    Eigen::VectorXd shuffled = rows;
+    for (const std::vector<int>& cell : cells_) {
+      std::vector<int> from = cell;
+      for (size_t left = from.size(); left > 1; --left) std::swap(from[left - 1], from[random->Below(left)]);
+      for (size_t m = 0; m < cell.size(); ++m)
+        shuffled.segment(contrasts_.FirstRow(cell[m]), RowsOf(cell[0])) =
+            rows.segment(contrasts_.FirstRow(from[m]), RowsOf(cell[0]));
+    }
+    return shuffled;
+  }
+
+ private:
+  int RowsOf(int t) const { return contrasts_.FirstRow(t + 1) - contrasts_.FirstRow(t); }
+
+  const touches::Contrasts& contrasts_;
+  std::vector<std::vector<int>> cells_;
+  double degrees_ = 0;
+};
+
+// One effect in one part.
+struct Difference {
+  int effect = -1, part = -1;
+  double gain_nats = 0;
+  double explained = 0;
+  int values = 0;
+};
+
+class DifferenceSearch {
+ public:
+  DifferenceSearch(const Workspace& workspace, const GivenAndEffects& columns, const SelectionResult& found)
+      : workspace_(workspace), columns_(columns), found_(found), repeats_(workspace) {}
+
+  absl::StatusOr<std::optional<GroupDifference>> Run() {
+    if (repeats_.degrees() < kMinRepeatDegrees) return std::nullopt;
+    ListParts();
+    // In the place of all that was found; else beside it, where that has a name: what a curve misses is no part.
+    std::vector<Difference> all = TryAll(columns_.given);
+    if (all.empty() || all[0].gain_nats < kAheadNats + NatsOfFound(parts_[all[0].part].of_rounds)) {
+      if (found_.formula >= 0 || NamelessNats() > 0) return std::nullopt;
+      all = TryAll(found_.fit);
+      if (all.empty() || all[0].gain_nats < kAheadNats) return std::nullopt;
+    }
+    const double p = ChanceOf(all[0]);
+    if (p > kDifferenceP) return std::nullopt;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool otherwise, SomethingElse(all[0]));
+    if (otherwise) return std::nullopt;
+    return Describe(all, p);
+  }
+
+ private:
+  void ListParts() {
+    const touches::Observations& searched = *workspace_.searched;
+    parts_ = ListSessionParts(*workspace_.observations);
+    std::vector<int> touch_of_row(workspace_.input.set->size(), -1);
+    for (int k = 0; k < workspace_.observations->size(); ++k)
+      touch_of_row[workspace_.observations->row[k]] = k;
+    for (const SessionPart& part : parts_) {
+      std::vector<char>& has = has_.emplace_back();
+      for (const int k : workspace_.contrasts->touches())
+        has.push_back(part.has[touch_of_row[searched.row[k]]]);
+    }
+  }
+
+  double Nats(double before, double after, double values) const {
+    return 0.5 * repeats_.degrees() * std::log(before / after) - 0.5 * values * std::log(repeats_.degrees());
+  }
+
+  // Of what repeats differ by under the given model, what a fit takes off; only values that change it are paid for.
+  double NatsOf(const engine::Fit& fit) const {
+    const Eigen::MatrixXd centred = repeats_.Centred(fit.columns.values);
+    int values = 0;
+    for (Eigen::Index i = 1; i < centred.cols(); ++i)
+      values += centred.col(i).squaredNorm() > kVisible * fit.columns.values.col(i).squaredNorm();
+    return Nats(repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm(),
+                std::max(centred.col(0).squaredNorm(), kLeastSquares), values);
+  }
+
+  // Of the whole explanation. Against rounds, which are known beforehand, a curve pays for each of its knots; against a stretch
+  // that was picked as freely, for its choice.
+  double NatsOfFound(bool against_rounds) const {
+    const double named = NatsOf(found_.without_formula), nameless = NamelessNats();
+    if (found_.formula < 0) return named + nameless;
+    double price = found_.search->rules().complexity_penalty_nats;
+    if (found_.curve && against_rounds) {
+      const double values =
+          static_cast<double>(found_.curve->knots.size()) * (workspace_.searched->fingers - 1);
+      price = 0.5 * values * std::log(repeats_.degrees());
+    }
+    return std::max(named + nameless, NatsOf(found_.fit) - price);
+  }
+
+  // What has no name, stands in no fit, and may say the same.
+  double NamelessNats() const {
+    double nats = 0;
+    if (found_.curve && found_.formula < 0) nats = std::max(nats, found_.curve->gain_nats);
+    if (found_.memory) nats = std::max(nats, found_.memory->gain_nats);
+    if (found_.partial) nats = std::max(nats, found_.partial->gain_nats);
+    return nats;
+  }
+
+  bool IsTried(const EffectColumns& effect) const {
+    return effect.shared < 0 && effect.extension.object.empty() && !effect.extension.nameless &&
+           effect.columns.cols() > 0;
+  }
+
+  Eigen::MatrixXd ColumnsOf(const Difference& d) const {
+    return repeats_.Centred(repeats_.Only(columns_.effects[d.effect].columns, has_[d.part]));
+  }
+
+  // Every effect in every part beside `fit`, the best first.
+  std::vector<Difference> TryAll(const engine::Fit& fit) {
+    base_ = &fit;
+    residuals_ = repeats_.Centred(fit.columns.values.col(0));
+    std::vector<Difference> tried;
+    const double before = residuals_.squaredNorm();
+    for (int effect = 0; effect < static_cast<int>(columns_.effects.size()); ++effect) {
+      if (!IsTried(columns_.effects[effect])) continue;
+      const double whole = columns_.effects[effect].columns.squaredNorm();
+      for (int part = 0; part < static_cast<int>(parts_.size()); ++part) {
+        Difference d{effect, part, 0, 0, static_cast<int>(columns_.effects[effect].columns.cols())};
+        const Eigen::MatrixXd columns = ColumnsOf(d);
+        if (!(columns.squaredNorm() > kVisible * whole)) continue;
+        const Eigen::VectorXd right = columns.transpose() * residuals_;
+        d.explained = right.dot(SymmetricSolver(columns.transpose() * columns).Solve(right));
+        if (!(d.explained > 0)) continue;
+        d.gain_nats = Nats(before, std::max(before - d.explained, kLeastSquares), d.values);
+        tried.push_back(d);
+      }
+    }
+    tries_ = static_cast<double>(tried.size());
+    for (Difference& d : tried) d.gain_nats -= std::log(tries_);
+    std::stable_sort(tried.begin(), tried.end(),
+                     [](const Difference& a, const Difference& b) { return a.gain_nats > b.gain_nats; });
+    return tried;
+  }
+
+  // P of such a difference by chance, over all that was tried: the F test, its ratio over what touches of each pose in other orders give: noise that grows on slopes or has tails
+  // stays with its poses.
+  double ChanceOf(const Difference& d) const {
+    const Eigen::MatrixXd columns = ColumnsOf(d);
+    const double rest = residuals_.squaredNorm() - d.explained, dof = repeats_.degrees() - d.values;
+    if (!(dof > 0) || !(rest > 0)) return 1;
+    const double noise = std::max(rest / dof, ExplainedInOtherOrders(columns) / d.values);
+    return std::min(1.0, FisherTail(d.explained / d.values / noise, d.values, dof) * tries_);
+  }
+
+  // The mean square that the columns explain of what they leave once touches have changed places.
+  double ExplainedInOtherOrders(const Eigen::MatrixXd& columns) const {
+    const Eigen::MatrixXd basis = ColumnSpan(columns).Basis();
+    const Eigen::VectorXd left = residuals_ - basis * (basis.transpose() * residuals_);
+    RandomStream random(workspace_.input.seed, RandomDomain::kDiagnosis);
+    double sum = 0;
+    for (int n = 0; n < kOrders; ++n)
+      sum += (basis.transpose() * repeats_.Shuffled(left, &random)).squaredNorm();
+    return sum / kOrders;
+  }
+
+  // An object that lay elsewhere in every round, or what changes slowly: a part is not the whole of it.
+  absl::StatusOr<bool> SomethingElse(const Difference& d) const {
+    const touches::Observations& o = *workspace_.searched;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
+                                workspace_.searched_predictor->Run(base_->model.base(), true, false));
+    const std::vector<double> residuals = touches::Residuals(o, details);
+    const RoundStructure rounds = FindRoundStructure(o, details, residuals);
+    if (rounds.p < kDifferenceP && rounds.gain_nats > d.gain_nats) return true;
+    const Eigen::MatrixXd columns = repeats_.Only(columns_.effects[d.effect].columns, has_[d.part]);
+    const std::vector<double> corrected = workspace_.contrasts->PerFinger(
+        base_->columns.values.col(0) - columns * SolutionOf(d), o.time_s.size());
+    return FindTimeStructure(o, corrected).p < kTimeStructureP;
+  }
+
+  Eigen::VectorXd SolutionOf(const Difference& d) const {
+    return SolveLeastSquares(ColumnsOf(d), residuals_);
+  }
+
+  absl::StatusOr<std::optional<GroupDifference>> Describe(const std::vector<Difference>& all,
+                                                          double p) const {
+    const Difference& best = all[0];
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Fitted fitted, FitIn(best));
+    GroupDifference found;
+    found.effect = NameOf(best);
+    found.part = parts_[best.part].words;
+    found.test = {parts_[best.part].of_rounds ? "round" : "touch", p, best.gain_nats};
+    found.more = ValuesOf(best, fitted);
+    const touches::Observations& o = *workspace_.observations;
+    for (int k = 0; k < o.size(); ++k)
+      if (parts_[best.part].has[k]) found.rows.push_back(o.row[k]);
+    std::vector<std::string> places = {found.part};
+    for (const Difference& other : all) {
+      if (other.gain_nats < best.gain_nats - kSameNats) break;
+      if (other.part == best.part && other.effect != best.effect && found.also.size() < kMaxAlso)
+        found.also.push_back(NameOf(other));
+      if (other.effect == best.effect && other.part != best.part && places.size() < kMaxPartsNamed)
+        places.push_back(parts_[other.part].words);
+    }
+    found.words = InWords(found, places, best, fitted.left.squaredNorm());
+    return found;
+  }
+
+  std::string NameOf(const Difference& d) const { return columns_.effects[d.effect].extension.name; }
+
+  // The effect in that part, fitted with the simulator in the loop: its response is no line.
+  struct Fitted {
+    engine::Parameterization start;  // where it changes nothing
+    Eigen::VectorXd more;            // beyond the start's last values
+    Eigen::MatrixXd columns;         // centred, there
+    Eigen::VectorXd left;            // residuals, centred
+  };
+  absl::StatusOr<Fitted> FitIn(const Difference& d) const {
+    const EffectColumns& effect = columns_.effects[d.effect];
+    Fitted fitted{effect.extension.start, SolutionOf(d), ColumnsOf(d), {}};
+    fitted.left = residuals_ - fitted.columns * fitted.more;
+    if (effect.extension.candidate < 0) return fitted;
+    fitted.start = base_->model;
+    fitted.start.Add(found_.search->candidates()[effect.extension.candidate].effect, false);
+    const std::vector<char>& has = has_[d.part];
+    const Eigen::VectorXd elsewhere =
+        base_->columns.values.col(0) - repeats_.Only(base_->columns.values.leftCols(1), has);
+    for (int step = 0; step < kSteps; ++step) {
+      engine::Parameterization there = fitted.start;
+      Eigen::VectorXd point = there.Start();
+      point.tail(d.values) += fitted.more;
+      there.MoveTo(there.Clip(point));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Fit at,
+                                  engine::FitModel(workspace_.experiment, std::move(there), 0));
+      const Eigen::VectorXd left =
+          repeats_.Centred(elsewhere + repeats_.Only(at.columns.values.leftCols(1), has));
+      if (step > 0 && left.squaredNorm() > fitted.left.squaredNorm()) break;
+      fitted.left = left;
+      fitted.more = at.point.tail(d.values) - fitted.start.Start().tail(d.values);
+      fitted.columns = repeats_.Centred(repeats_.Only(at.columns.values.rightCols(d.values), has));
+      if (step + 1 < kSteps) fitted.more += SolveLeastSquares(fitted.columns, left);
+    }
+    return fitted;
+  }
+
+  // The difference of the effect's values, in the units of files.
+  std::vector<engine::ParameterEstimate> ValuesOf(const Difference& d, const Fitted& fitted) const {
+    const engine::Parameterization& start = fitted.start;
+    const double variance = fitted.left.squaredNorm() / (repeats_.degrees() - d.values);
+    const int size = start.size(), own = size - d.values;
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
+    covariance.bottomRightCorner(d.values, d.values) =
+        variance * SymmetricSolver(fitted.columns.transpose() * fitted.columns)
+                       .SolveColumns(Eigen::MatrixXd::Identity(d.values, d.values));
+    Eigen::VectorXd point = start.Start();
+    const int effect = start.parameters()[own].effect;
+    const std::vector<engine::ParameterEstimate> rest = start.Describe(effect, point, covariance);
+    point.tail(d.values) += fitted.more;
+    std::vector<engine::ParameterEstimate> there = start.Describe(effect, point, covariance);
+    for (size_t i = 0; i < there.size(); ++i) there[i].value -= rest[i].value;
+    return there;
+  }
+
+  std::string InWords(const GroupDifference& found, const std::vector<std::string>& places,
+                      const Difference& d, double left) const {
+    std::vector<std::string> values;
+    for (const engine::ParameterEstimate& value : found.more)
+      if (std::abs(value.value) > kClearErrors * value.std_error)
+        values.push_back(
+            absl::StrCat(value.name, value.entry.empty() ? "" : " ", value.entry,
+                         absl::StrFormat(value.std_error < 10 ? " %+.4g +- %.1g" : " %+.0f +- %.0f",
+                                         value.value, value.std_error),
+                         value.unit.empty() ? "" : " ", value.unit));
+    const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
+    std::string words =
+        absl::StrCat("Something was other ", absl::StrJoin(places, ", or "), ": ", found.effect,
+                     " differs there by ", values.empty() ? "little" : absl::StrJoin(values, ", "));
+    if (!found.also.empty())
+      absl::StrAppend(&words, " (", absl::StrJoin(found.also, ", "), found.also.size() > 1 ? " say" : " says",
+                      " nearly the same)");
+    absl::StrAppend(
+        &words, ". Touches of one pose differ by ", scatter(residuals_.squaredNorm()), ", and by ",
+        scatter(left),
+        " once it is taken off. Find what changed, or measure those touches again: everything else "
+        "here was found on the other touches.");
+    if (parts_[d.part].of_rounds && workspace_.input.set->round.empty())
+      absl::StrAppend(&words, " Round 0 is the first touch of each pose.");
+    return words;
+  }
+
+  const Workspace& workspace_;
+  const GivenAndEffects& columns_;
+  const SelectionResult& found_;
+  const Repeats repeats_;
+  std::vector<SessionPart> parts_;
+  std::vector<std::vector<char>> has_;  // of each part, by touch of the contrasts
+  const engine::Fit* base_ = nullptr;   // that differences are tried beside
+  Eigen::VectorXd residuals_;           // its own, centred
+  double tries_ = 1;
+};
+
+}  // namespace
+
+absl::StatusOr<std::optional<GroupDifference>> FindGroupDifference(const Workspace& workspace,
+                                                                   const GivenAndEffects& columns,
+                                                                   const SelectionResult& found) {
+  return DifferenceSearch(workspace, columns, found).Run();
+}
+
+}  // namespace touchstone::diagnosis::selection
