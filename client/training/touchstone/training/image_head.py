@@ -8,12 +8,37 @@ import numpy as np
 import torch
 from torch import nn
 
+from .separation import check
+
 UNITS = 128
 LEARNING_RATE = 0.001
 EPOCHS = 4
 VALIDATION = 0.2
 # Left open by the seed: pictures a step.
 BATCH = 32
+
+
+@dataclasses.dataclass(frozen=True)
+class SeenPictures:
+    """Attributes:
+      values: (N, F) features.
+      objects: (N,) what is to be said.
+      poses: (N,) a number for the pose of the camera, the same for copies of one picture.
+    """
+
+    values: np.ndarray
+    objects: np.ndarray
+    poses: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    def __getitem__(self, rows) -> SeenPictures:
+        return SeenPictures(self.values[rows], self.objects[rows], self.poses[rows])
+
+
+def joined(*parts: SeenPictures) -> SeenPictures:
+    return SeenPictures(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "objects", "poses")))
 
 
 @dataclasses.dataclass
@@ -23,6 +48,7 @@ class Head:
     Attributes:
       classes: how many.
       validation: (V,) rows of its training set that it was not trained on; of every object the same share.
+      trained_poses: of the pictures that it was trained on.
     """
 
     network: nn.Module
@@ -30,22 +56,23 @@ class Head:
     deviation: np.ndarray
     classes: int
     validation: np.ndarray
+    trained_poses: np.ndarray
 
-    def probabilities(self, features: np.ndarray) -> np.ndarray:
-        """(N, classes) of (N, F) features; each row adds up to 1."""
+    def probabilities(self, pictures: SeenPictures) -> np.ndarray:
+        """(N, classes); each row adds up to 1. separation.Leak if one of them was trained on."""
+        check(self.trained_poses, pictures.poses)
         with torch.no_grad():
-            return torch.softmax(self.network(_tensor(features, self.mean, self.deviation)), 1).double().numpy()
+            return torch.softmax(self.network(_tensor(pictures.values, self.mean, self.deviation)), 1).double().numpy()
 
-    def accuracy(self, features: np.ndarray, objects: np.ndarray) -> float:
-        return float(np.mean(self.probabilities(features).argmax(1) == objects))
+    def accuracy(self, pictures: SeenPictures) -> float:
+        return float(np.mean(self.probabilities(pictures).argmax(1) == pictures.objects))
 
 
-def train(features: np.ndarray, objects: np.ndarray, classes: int, seed: int, epochs: int = EPOCHS,
-          groups: np.ndarray | None = None) -> Head:
-    """Of (N, F) features and (N,) objects. `groups`: (N,) pictures of one group, as copies of one picture are, stay together on
-    one side of the split; default: each is its own. The features are standardised by those trained on."""
+def train(pictures: SeenPictures, classes: int, seed: int, epochs: int = EPOCHS) -> Head:
+    """Pictures of one pose, as copies of one picture are, stay together on one side of the split. The features are
+    standardised by those trained on."""
     rng = np.random.default_rng(seed)
-    groups = np.arange(len(objects)) if groups is None else groups
+    features, objects, groups = pictures.values, pictures.objects, pictures.poses
     held = np.isin(groups, _validation_groups(groups, objects, classes, rng))
     rows = np.flatnonzero(~held)
     mean, deviation = features[rows].mean(0), features[rows].std(0) + 1e-6
@@ -63,7 +90,7 @@ def train(features: np.ndarray, objects: np.ndarray, classes: int, seed: int, ep
             optimizer.zero_grad()
             nn.functional.cross_entropy(network(inputs[batch]), targets[batch]).backward()
             optimizer.step()
-    return Head(network.eval(), mean, deviation, classes, np.flatnonzero(held))
+    return Head(network.eval(), mean, deviation, classes, np.flatnonzero(held), np.unique(groups[rows]))
 
 
 def _validation_groups(groups, objects, classes, rng):
@@ -75,4 +102,7 @@ def _validation_groups(groups, objects, classes, rng):
 
 
 def _tensor(features, mean, deviation):
-    return torch.as_tensor((features - mean) / deviation).float()
+    # In place where it can be: a whole run's maps take 200 MB.
+    scaled = features - mean
+    scaled /= deviation
+    return torch.as_tensor(scaled).float()
