@@ -91,6 +91,13 @@ def dealt_sets(data: TouchData, touches: int, rng: np.random.Generator, features
     return of_rows(data, dealt_rows(data, touches, rng), features)
 
 
+def some(sets: FeatureSets, count: int, rng: np.random.Generator) -> FeatureSets:
+    """`count` of them, at random; ValueError if there are fewer."""
+    if len(sets) < count:
+        raise ValueError(f"{count} sets are wanted, there are {len(sets)}")
+    return sets[rng.permutation(len(sets))[:count]]
+
+
 def drawn_sets(data: TouchData, touches: int, sets: int, rng: np.random.Generator, features: Features = curvatures) -> FeatureSets:
     """`sets` sets, the objects in turn: each of `touches` different touches of one object, drawn at random; a touch may be
     in several sets.

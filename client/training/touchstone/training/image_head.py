@@ -53,7 +53,7 @@ class Head:
 
     network: nn.Module
     mean: np.ndarray
-    deviation: np.ndarray
+    deviation: float
     classes: int
     validation: np.ndarray
     trained_poses: np.ndarray
@@ -69,13 +69,14 @@ class Head:
 
 
 def train(pictures: SeenPictures, classes: int, seed: int, epochs: int = EPOCHS) -> Head:
-    """Pictures of one pose, as copies of one picture are, stay together on one side of the split. The features are
-    standardised by those trained on."""
+    """Pictures of one pose, as copies of one picture are, stay together on one side of the split. From the features
+    goes their mean over those trained on, and one number scales them all: a pixel of a map that is black in all of these would have
+    no deviation of its own."""
     rng = np.random.default_rng(seed)
     features, objects, groups = pictures.values, pictures.objects, pictures.poses
     held = np.isin(groups, _validation_groups(groups, objects, classes, rng))
     rows = np.flatnonzero(~held)
-    mean, deviation = features[rows].mean(0), features[rows].std(0) + 1e-6
+    mean, deviation = features[rows].mean(0), float(features[rows].std()) + 1e-6
     generator = torch.Generator().manual_seed(seed)
     network = nn.Sequential(nn.Linear(features.shape[1], UNITS), nn.ReLU(), nn.Linear(UNITS, classes))
     with torch.no_grad():  # PyTorch's own initial values, but drawn from this seed

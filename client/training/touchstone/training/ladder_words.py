@@ -105,7 +105,7 @@ def _gap_words(climb, kind):
     model = estimate(accuracy["again"][:, -1] - accuracy["rig"][:, -1])
     told = lambda e: "" if e.low > 0 or e.high < 0 else ", which cannot be told from none"
     return (f"What is left on the {climb.hidden.name} between the last model's own simulation and the {kind} touches is in part the poses that the rig was given, "
-            f"{_points(poses)}{told(poses)}, and in part what the model still lacks, {_points(model)}{told(model)}: the same commanded touches "
+            f"{points(poses)}{told(poses)}, and in part what the model still lacks, {points(model)}{told(model)}: the same commanded touches "
             "were simulated again.")
 
 

@@ -28,7 +28,8 @@ from .settings import SUPERSHAPES
 
 STANDOFF_MM, DISTANCE_MM, RADIUS_MM = 150.0, 250.0, 310.0
 SIDE_PX = 224
-VIRTUAL = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
+# The seed's steps of a degree would have a view come again now and then, in training and in a test.
+VIRTUAL = touchstone.sphere(step_angle_deg=0.1, roll_step_deg=0.1, radius_ratio=2.4)
 
 
 @dataclasses.dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import pathlib
 from collections.abc import Sequence
 from typing import Any
@@ -56,6 +57,10 @@ class TouchData:
 
     def poses(self) -> np.ndarray:
         """(N,) a number for each commanded pose of each object; rounds of one pose have the same, from every source."""
+        return self._poses
+
+    @functools.cached_property
+    def _poses(self) -> np.ndarray:
         return command_numbers(self.objects, self.object, self.target_mm, self.approach, self.lateral)
 
     def save(self, path: pathlib.Path) -> None:

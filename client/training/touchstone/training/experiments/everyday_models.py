@@ -16,7 +16,7 @@ from touchstone.own_server import OwnServer
 from .. import figures, paired, plans, recognisers
 from ..context import Context
 from ..experiment import Experiment
-from ..features import dealt_sets, drawn_sets
+from ..features import dealt_sets, drawn_sets, some
 from ..picture_data import FeatureCache, photographed
 from ..result import Comparison, Result, Table
 from ..separation import pose_seed
@@ -73,7 +73,7 @@ def _serve(files: list[pathlib.Path], stack: contextlib.ExitStack) -> touchstone
 
 def _pictures(context: Context) -> tuple[int, int]:
     """Of an object, for training and for testing."""
-    return context.settings.pick((16, 8), (100, 40))
+    return context.settings.pick((16, 8), (50, 20))
 
 
 def _recognise(context, cache, name, client, objects, counts) -> Group:
@@ -84,10 +84,12 @@ def _recognise(context, cache, name, client, objects, counts) -> Group:
         context.progress(step / settings.seeds, f"{name}, seed {seed}")
         touch = lambda samples, model, use, seed=seed: collect(client, objects, PLAN, samples, model=model, seed=pose_seed(use, "everyday", seed))
         pools = {kind: touch(PER_OBJECT * classes, model, "training") for kind, model in models.items()}
-        tests = touch((TEST_SETS + classes) * max(counts), plans.NOISY, "testing")
+        tests = touch((TEST_SETS + 2 * classes) * max(counts), plans.NOISY, "testing")
+        # In steps of a degree a pose comes again now and then.
+        tests = tests[~np.isin(tests.poses(), pools["ideal"].poses())]
         for place, touches in enumerate(counts):
-            test = dealt_sets(tests, touches, context.rng(name, "test", seed, touches))
-            test = test[context.rng(name, "part", seed, touches).permutation(len(test))[:TEST_SETS]]
+            rng = context.rng(name, "test", seed, touches)
+            test = some(dealt_sets(tests, touches, rng), TEST_SETS, rng)
             for k, kind in enumerate(models):
                 train = drawn_sets(pools[kind], touches, len(pools[kind]), context.rng(name, kind, seed, touches))
                 recogniser = recognisers.Trained(recognisers.SEEDS["XGBoost"](seed), train)
@@ -103,7 +105,8 @@ def _both(context, cache, client, objects, pool, tests, seed):
     """Both senses, trained without noise and tested with it."""
     per_object, test_per_object = _pictures(context)
     train, validation = virtual_sets(pool, TOUCHES, np.random.default_rng([seed, 3]))
-    sets = dealt_sets(tests, TOUCHES, np.random.default_rng([seed, 5]))[:: max(1, len(objects) // 5)]
+    rng = np.random.default_rng([seed, 5])
+    sets = some(dealt_sets(tests, TOUCHES, rng), 40 * len(objects), rng)
     pictures = lambda count, use, model: cache(photographed(client, objects, count, pose_seed(use, "everyday pictures", seed), model=model))
     image = by_pictures(pictures(per_object, "training", plans.IDEAL), len(objects), seed, pictures(test_per_object, "testing", NOISY_PICTURES))
     return fused(by_touch(seed, train, validation, sets), image)

@@ -23,7 +23,7 @@ def variants(plain: Pictures, normalised: Pictures) -> dict[str, Pictures]:
 
 def run(context: Context) -> Result:
     settings, cache = context.settings, FeatureCache(context)
-    per_object, test_per_object = settings.pick((8, 5), (60, 15))
+    per_object, test_per_object = settings.pick((8, 5), (30, 15))
     # The first poses of the pool of other experiments are those of the pictures as they are.
     pool, pool_per_object = measured(context, sizes(context).measured_per_object), sizes(context).measured_per_object
     normalised = pool[np.flatnonzero(np.arange(len(pool)) % pool_per_object < test_per_object)]

@@ -12,7 +12,6 @@ from ..result import Comparison, Result, Table
 from ..statistics import estimate_share, estimates
 from ..touch_data import TouchData
 
-TOUCHES = 15  # of a set, where one number is shown
 # The seed's samples are touches: 640 virtual and 160 measured ones, or 768, which is 80 % of its 960. The other 192 are tested.
 VIRTUAL, REAL, TEST_SHARE, TEST_SETS = 640, 160, 0.2, 300
 
@@ -20,6 +19,11 @@ VIRTUAL, REAL, TEST_SHARE, TEST_SETS = 640, 160, 0.2, 300
 def set_sizes(context: Context) -> list[int]:
     """Touches of a set; of a quick run's few measured ones none can be large."""
     return context.settings.pick([5, 8], [5, 10, 15, 20, 25, 30])
+
+
+def shown_size(context: Context) -> int:
+    """Touches of a set where one number is shown."""
+    return context.settings.pick(8, 15)
 
 
 def sets_of(parts: dict[str, TouchData], touches: int, sets: int, rng: np.random.Generator) -> FeatureSets:
@@ -58,25 +62,21 @@ def run(context: Context) -> Result:
                 for k, (name, make) in enumerate(recognisers.SEEDS.items()):
                     matrix = recognisers.confusion(recognisers.Trained(make(seed), train), test, len(plans.OBJECTS))
                     accuracies[k, place, column] = matrix.trace() / matrix.sum()
-                    if name == "XGBoost" and touches == _shown(counts):
+                    if name == "XGBoost" and touches == shown_size(context):
                         confusions[title] = confusions.get(title, 0) + matrix
         found.append(accuracies)
     return _result(context, counts, names, trained, np.array(found), confusions, len(rig))
 
 
-def _shown(counts: list[int]) -> int:
-    return TOUCHES if TOUCHES in counts else counts[-1]
-
-
 def _result(context, counts, names, trained, found, confusions, rig_touches):
     """`found`: (seeds, recognisers, training sets, touches of a set)."""
-    kind, shown = context.settings.measured_kind, _shown(counts)
+    kind, shown = context.settings.measured_kind, shown_size(context)
     column = counts.index(shown)
     ideal, noisy, mixed, real = found[:, 0, :, column].T
     result = Result("", "", made_on=[
         f"simulated touches, without noise and with a standard deviation of {plans.SIGMA_US / 1e6:g} s, new for every seed",
         (f"{rig_touches} {kind} touches that were made once; {TEST_SHARE:.0%} of the poses of each object are for testing, others for "
-         "every seed, and no round of them is trained on"),
+         "every seed"),
         (f"{VIRTUAL + REAL} sets in training and {TEST_SETS} in testing, drawn from the touches that are named: a touch is in several "
          "of them")])
     result.words = [

@@ -18,7 +18,7 @@ from ..features import dealt_sets, drawn_sets
 from ..measured_sets import part, split
 from ..result import Result, Table
 from ..statistics import estimate_share
-from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, TOUCHES, VIRTUAL
+from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, VIRTUAL, shown_size
 
 
 
@@ -27,6 +27,7 @@ class Choices:
     """What the other experiments use; each row of the table changes one."""
 
     features: features.Features = features.curvatures
+    rounds: bool = False  # of plans.measured_in_rounds()
     by_pose: bool = True
     dealt: bool = False  # every touch in one set at most, in training
     recogniser: Callable[[int], Any] = recognisers.SEEDS["XGBoost"]
@@ -46,7 +47,8 @@ def variations() -> dict[str, Choices]:
         "a histogram of 8 bins": Choices(features=functools.partial(features.histogram, bins=8)),
         "four moments": Choices(features=features.moments),
         "a touch in one set at most, in training": Choices(dealt=True),
-        "split by touch: rounds of a pose on both sides": Choices(by_pose=False),
+        "the rig measures in rounds, split by pose": Choices(rounds=True),
+        "the rig measures in rounds, split by touch: rounds of a pose on both sides": Choices(rounds=True, by_pose=False),
         "30 trees instead of 100": Choices(recogniser=trees(30, 4)),
         "depth 2 instead of 4": Choices(recogniser=trees(100, 2)),
         "depth 8 instead of 4": Choices(recogniser=trees(100, 8)),
@@ -58,18 +60,18 @@ def variations() -> dict[str, Choices]:
 
 def run(context: Context) -> Result:
     settings, kind = context.settings, context.settings.measured_kind
-    rig = context.measured(plans.measured(settings), options=plans.RIG)
+    rig, rounds = (context.measured(plan, options=plans.RIG) for plan in (plans.measured(settings), plans.measured_in_rounds(settings)))
     table = variations()
     found = np.zeros((len(table), settings.seeds))
     for step, seed in enumerate(settings.runs):
         context.progress(step / settings.seeds, f"seed {seed}")
         for place, choices in enumerate(table.values()):
-            found[place, step] = _accuracy(context, rig, choices, seed)
+            found[place, step] = _accuracy(context, rounds if choices.rounds else rig, choices, seed)
     differences = [paired.difference(values, found[0]) for values in found]
     signed = lambda d: f"{100 * d.value:+.1f} ({100 * d.low:+.1f} to {100 * d.high:+.1f})"
     clear = [f"{name} ({100 * d.value:+.1f} points)" for name, d in list(zip(table, differences))[1:] if d.low > 0 or d.high < 0]
     result = Result("", "", made_on=[
-        (f"XGBoost, trained on {VIRTUAL} simulated touches (new for every seed) and {REAL} {kind} ones in sets of {TOUCHES}, tested on "
+        (f"XGBoost, trained on {VIRTUAL} simulated touches (new for every seed) and {REAL} {kind} ones in sets of {shown_size(context)}, tested on "
          f"{TEST_SETS} {kind} sets; the {len(rig)} {kind} touches were made once")])
     result.words = [("Of the choices that the seed leaves open these change the accuracy by more than the seeds do: " +
                      ", ".join(clear) + ".") if clear else "None of these choices changes the accuracy by more than the seeds do.",
@@ -84,12 +86,13 @@ def run(context: Context) -> Result:
 def _accuracy(context: Context, rig, choices: Choices, seed: int) -> float:
     """Rows share their random numbers, so that their differences hold only what was changed."""
     model = plans.NOISY.replace(f"{plans.SIGMA_US:.0f}", f"{choices.sigma_us:.0f}")
+    touches = shown_size(context)
     rows, test_rows = split(rig, TEST_SHARE, context.rng("split", seed), by_pose=choices.by_pose)
-    test = drawn_sets(rig[test_rows], TOUCHES, TEST_SETS, context.rng("test", seed), choices.features)
+    test = drawn_sets(rig[test_rows], touches, TEST_SETS, context.rng("test", seed), choices.features)
     pool = context.simulated(VIRTUAL, plan=choices.plan, model=model, seed=seed)
     real = part(rig[rows], REAL, context.rng("part", seed))
-    sets = [dealt_sets(data, TOUCHES, context.rng(name, seed), choices.features) if choices.dealt
-            else drawn_sets(data, TOUCHES, len(data), context.rng(name, seed), choices.features)
+    sets = [dealt_sets(data, touches, context.rng(name, seed), choices.features) if choices.dealt
+            else drawn_sets(data, touches, len(data), context.rng(name, seed), choices.features)
             for name, data in (("virtual", pool), ("rig", real))]
     return recognisers.Trained(choices.recogniser(seed), *sets, check_poses=choices.by_pose).accuracy(test)
 

@@ -7,7 +7,7 @@ import numpy as np
 from .. import controls, features, figures, paired, plans, recognisers
 from ..context import Context
 from ..experiment import Experiment
-from ..features import dealt_sets, drawn_sets
+from ..features import dealt_sets, drawn_sets, some
 from ..result import Comparison, Result, Table
 from ..statistics import estimate_share, estimates
 
@@ -32,7 +32,7 @@ def run(context: Context) -> Result:
             for seen, of in SEEN.items():
                 rng = lambda what, seed=seed, touches=touches: context.rng(what, seed, touches)
                 train = drawn_sets(pool, touches, TRAINING_TOUCHES, rng("train"), of)
-                tests = {"simulated": dealt_sets(unseen, touches, rng("simulated"), of)[:TEST_SETS],
+                tests = {"simulated": some(dealt_sets(unseen, touches, rng("simulated"), of), TEST_SETS, rng("some")),
                          kind: drawn_sets(rig, touches, TEST_SETS, rng("rig"), of)}
                 for k, make in enumerate(recognisers.SEEDS.values()):
                     recogniser = recognisers.Trained(make(seed), train)

@@ -10,7 +10,7 @@ from ..experiment import Experiment
 from ..features import drawn_sets
 from ..result import Result, Table
 from ..statistics import estimates
-from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, TOUCHES, VIRTUAL, set_sizes, sets_of
+from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, VIRTUAL, set_sizes, sets_of, shown_size
 
 TOTAL = VIRTUAL + REAL
 
@@ -34,7 +34,7 @@ def run(context: Context) -> Result:
                 rng = context.rng("sets", seed, touches, share)
                 parts = {"virtual": measured_sets.part(pool, total - total * share // 100, rng),
                          "rig": measured_sets.part(rig[rows], total * share // 100, rng)}
-                if min(len(part) for part in parts.values() if len(part)) < 5 * touches:
+                if min(len(part) for part in parts.values() if len(part)) < len(plans.OBJECTS) * touches:
                     found[column, :, step, place] = np.nan  # too few touches of one source for a set of each object
                     continue
                 train = sets_of({name: part for name, part in parts.items() if len(part)}, touches, TOTAL, rng)
@@ -45,7 +45,7 @@ def run(context: Context) -> Result:
 
 def _result(context, shares, counts, found, total, rig_touches):
     kind = context.settings.measured_kind
-    shown = TOUCHES if TOUCHES in counts else counts[-1]
+    shown = shown_size(context)
     values = found[counts.index(shown)]
     possible = [k for k in range(len(shares)) if np.isfinite(values[0, :, k]).all()]
     best = shares[max(possible, key=lambda k: values[0, :, k].mean())]
