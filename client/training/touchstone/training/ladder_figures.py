@@ -29,7 +29,7 @@ def draw_ladder(context: Context, climbs: Sequence[Climb], alone: Mapping[str, t
         axes.axhline(100 / len(plans.OBJECTS), color="#7b8794", linestyle=":", linewidth=1)
         axes.annotate("chance", (1, 100 / len(plans.OBJECTS)), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8,
                       color="#7b8794")
-        axes.set(ylim=(0, 100), title=f"{climb.hidden.name}: {100 * climb.gain().value:+.0f} points")
+        axes.set(ylim=(0, 100), title=f"{climb.hidden.name}: {100 * climb.gain().value:+.1f} points")
         axes.set_xticks(x, [f"{r.name}\n{r.rmse_us / 1e3:.1f} ms" for r in climb.rungs], rotation=25, ha="right", fontsize=8)
     all_axes[0].set_ylabel("accuracy, %")
     all_axes[0].legend(loc="lower right", fontsize=8)
@@ -61,7 +61,8 @@ def draw_worth(context: Context, climb: Climb, worth: Mapping[str, Sequence[Mapp
     left.legend(loc="upper left")
     known = [(k, rank) for k, rank in enumerate(ranks) if rank is not None]
     right.errorbar([k for k, _ in known], [rank.value for _, rank in known],
-                   [[rank.value - rank.low for _, rank in known], [rank.high - rank.value for _, rank in known]], marker="o", linestyle="", capsize=2, color=figures.colour("both"))
+                   [[rank.value - rank.low for _, rank in known], [rank.high - rank.value for _, rank in known]],
+                   marker="o", linestyle="", capsize=2, color=figures.colour("both"))
     right.axhline(0, color="#7b8794", linewidth=1)
     right.set(ylabel="Spearman's rank correlation", title="Ten recognisers, simulated and tested", ylim=(-1.05, 1.05))
     for axes in (left, right):

@@ -76,9 +76,10 @@ def _spread_words(climbs, kind) -> str:
     gains = [100 * climb.gain().value for climb in climbs]
     harms = [f"{climb.rungs[k].name[2:]} of the {climb.hidden.name}" for climb in climbs for k in range(1, len(climb.rungs))
              if climb.judgement(k) != "recognises more" and ("HARMS" in climb.judgement(k) or "rises" in climb.judgement(k))]
-    return (f"On the {kind} touches of {len(climbs)} rigs with other hidden physics the last model recognises {', '.join(f'{g:+.1f}' for g in gains)} points "
-            f"of the sets more than the nominal one: {np.mean(gains):+.1f} on average, and {np.ptp(gains):.1f} points between the largest and the "
-            f"smallest. Steps that harm on touches which no model has seen: {', '.join(harms) or 'none'}.")
+    each = ", ".join(f"{gain:+.1f}" for gain in gains)
+    return (f"On the {kind} touches of {len(climbs)} rigs with other hidden physics the last model recognises {each} points of the sets more than "
+            f"the nominal one: {np.mean(gains):+.1f} on average, and {np.ptp(gains):.1f} points between the largest and the smallest. "
+            f"Steps that harm on touches which no model has seen: {', '.join(harms) or 'none'}.")
 
 
 def _answer(climb, kind):
@@ -95,7 +96,8 @@ def _answer(climb, kind):
 
 def _step_words(climb):
     for k in range(1, len(climb.rungs)):
-        yield (f"{climb.hidden.name}, {climb.rungs[k].name[2:]}: RMSE {climb.rungs[k - 1].rmse_us / 1e3:.1f} to {climb.rungs[k].rmse_us / 1e3:.1f} ms; "
+        before, rung = climb.rungs[k - 1 : k + 1]
+        yield (f"{climb.hidden.name}, {rung.name[2:]}: RMSE {before.rmse_us / 1e3:.1f} to {rung.rmse_us / 1e3:.1f} ms; "
                f"{climb.judgement(k)}, {points(climb.step(k))}.")
 
 
@@ -104,9 +106,9 @@ def _gap_words(climb, kind):
     poses = estimate(accuracy["simulated"][:, -1] - accuracy["again"][:, -1])
     model = estimate(accuracy["again"][:, -1] - accuracy["rig"][:, -1])
     told = lambda e: "" if e.low > 0 or e.high < 0 else ", which cannot be told from none"
-    return (f"What is left on the {climb.hidden.name} between the last model's own simulation and the {kind} touches is in part the poses that the rig was given, "
-            f"{points(poses)}{told(poses)}, and in part what the model still lacks, {points(model)}{told(model)}: the same commanded touches "
-            "were simulated again.")
+    return (f"What is left on the {climb.hidden.name} between the last model's own simulation and the {kind} touches is in part the poses that the "
+            f"rig was given, {points(poses)}{told(poses)}, and in part what the model still lacks, {points(model)}{told(model)}: "
+            "the same commanded touches were simulated again.")
 
 
 def _rank_words(climb):

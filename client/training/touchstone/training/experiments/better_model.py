@@ -151,7 +151,8 @@ def _covers(y, f, rng, repeats=400):
 def _result(context, climbs, alone, worth):
     kind, first = context.settings.measured_kind, climbs[0]
     result = Result("", "", made_on=[
-        f"{len(climbs)} rigs, each with other hidden physics; diagnosed: {first.diagnosed:,} {kind} touches of {' and '.join(ladder.DIAGNOSED)} by each",
+        (f"{len(climbs)} rigs, each with other hidden physics; diagnosed: {first.diagnosed:,} {kind} touches of "
+         f"{' and '.join(ladder.DIAGNOSED)} by each"),
         (f"tested on {min(each.tested for each in climbs):,} other {kind} touches of {len(plans.OBJECTS)} objects or more, made once; intervals of "
          "accuracy are over the simulated touches, the dealing into sets and the training of each seed, not over other touches of the rig"),
         f"trained on touches simulated by each model; sets of {TOUCHES} touches"])

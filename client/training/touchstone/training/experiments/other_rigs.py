@@ -86,7 +86,8 @@ def _columns(client, touches, seed, model=None):
 
 def _measured(context, rig):
     per_face = context.settings.pick(3, 16)
-    return context.kept([rig.options, "lines", per_face, STROKE_MM], lambda: _columns(context.rig(*rig.options), lines(per_face, pose_seed("rig", "lines")), 31))
+    return context.kept([rig.options, "lines", per_face, STROKE_MM], lambda: _columns(
+        context.rig(*rig.options), lines(per_face, pose_seed("rig", "lines")), 31))
 
 
 def seen(times_us: np.ndarray, spacing_mm: float) -> tuple[np.ndarray, float, str]:
@@ -119,8 +120,8 @@ def _seed(context, rig, measured, seed):
     """(accuracy on its own simulation, on the rig's touches, [with shuffled labels in training, on its own simulation])."""
     settings = context.settings
     per_face = -(-settings.pick(40, 120) * TOUCHES // 6)
-    train, test = (_sets(_columns(context.simulator, lines(per_face, pose_seed(use, "lines", seed)), pose_seed(use, "noise", seed), rig.model), rig.spacing_mm,
-                         np.random.default_rng(seed)) for use in ("training", "testing"))
+    train, test = (_sets(_columns(context.simulator, lines(per_face, pose_seed(use, "lines", seed)), pose_seed(use, "noise", seed), rig.model),
+                         rig.spacing_mm, np.random.default_rng(seed)) for use in ("training", "testing"))
     recogniser = Trained(SEEDS["XGBoost"](seed), train)
     told = context.rng("shuffled", rig.name, seed)
     return (recogniser.accuracy(test), recogniser.accuracy(_sets(measured, rig.spacing_mm, context.rng("deal", seed))),

@@ -21,7 +21,6 @@ from ..statistics import estimate_share
 from .noise_in_training import REAL, TEST_SETS, TEST_SHARE, VIRTUAL, shown_size
 
 
-
 @dataclasses.dataclass(frozen=True)
 class Choices:
     """What the other experiments use; each row of the table changes one."""
