@@ -229,7 +229,7 @@ def test_the_last_rung_is_what_the_command_line_saves(client, tmp_path):
         "  - tip_radius: {radius_mm: 3}\n  - formula:\n      name: screw\n      adds: travel_mm\n      expression: \"k * sin(2*pi*travel_mm/5)\"\n"
         "      parameters:\n        k: {value: 0.5, unit: mm, min: -1, max: 1}\n")
     context: Any = types.SimpleNamespace(simulator=client)
-    data = collect(client, ladder.DIAGNOSED, touchstone.faces(samples_per_face=24, rounds=1), 288, model=rig, seed=4)
+    data = collect(client, ladder.DIAGNOSED, touchstone.faces(samples_per_face=8, rounds=1), 96, model=rig, seed=4)
     ladder.write_set(data, tmp_path / "set.csv")
     (tmp_path / "nominal.yaml").write_text(ladder.NOMINAL)
     rungs = ladder.models(context.simulator.diagnose(tmp_path / "set.csv", ladder.NOMINAL, seed=1))

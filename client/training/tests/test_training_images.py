@@ -14,7 +14,7 @@ from torch import nn
 
 import touchstone
 from touchstone.own_server import find_server
-from touchstone.training import controls, image_head, onnx_file, picture_data, separation, streaming
+from touchstone.training import controls, features, image_head, onnx_file, picture_data, separation, streaming
 from touchstone.training.backbone import CAFFE, TORCHVISION, Backbone, NoNetwork, prepare
 from touchstone.training.context import Context
 from touchstone.training.experiments import image_recognition
@@ -62,7 +62,7 @@ def test_features_are_the_last_maps_flattened(small):
     backbone = Backbone(path)
     assert (backbone.maps, backbone.features_count, backbone.side_px) == (4, 4 * 7 * 7, 32)
     np.testing.assert_allclose(backbone.features(picture[None])[0], wanted.numpy().ravel(), atol=1e-5)
-    pictures = image_head.SeenPictures(backbone.features(picture[None]), np.zeros(1, int), np.zeros(1, int))
+    pictures = features.FeatureSets(backbone.features(picture[None]), np.zeros(1, int), np.zeros(1, int))
     np.testing.assert_allclose(image_recognition.pooled(pictures, 4).values[0], wanted.numpy().mean((0, 2, 3)), atol=1e-5)
 
 
@@ -132,7 +132,7 @@ def _clusters(seed, count=60, classes=5, apart=3.0):
     rng = np.random.default_rng(seed)
     objects = np.arange(count * classes) % classes
     centres = np.random.default_rng(99).normal(size=(classes, 20)) * apart
-    return image_head.SeenPictures(centres[objects] + rng.normal(size=(len(objects), 20)), objects, 1000 * seed + np.arange(len(objects)))
+    return features.FeatureSets(centres[objects] + rng.normal(size=(len(objects), 20)), objects, 1000 * seed + np.arange(len(objects)))
 
 
 def _shuffled(pictures, seed):
@@ -176,7 +176,7 @@ def test_no_measured_picture_is_in_training_and_testing(tmp_path, monkeypatch):
     monkeypatch.setattr("touchstone.training.experiments.image_augmentation.measured", lambda *_: pool)
     # The mean of a picture stands for its features: copies are told by their row, whose number is the picture's first pixel.
     pool.image[:, :] = np.arange(count)[:, None, None, None]
-    cache: Any = lambda pictures: image_head.SeenPictures(pictures.image.reshape(len(pictures), -1).mean(1, keepdims=True), pictures.object,
+    cache: Any = lambda pictures: features.FeatureSets(pictures.image.reshape(len(pictures), -1).mean(1, keepdims=True), pictures.object,
                                                           pictures.poses)
     real = MeasuredFeatures(context, cache)
     for seed in range(20):
@@ -216,10 +216,10 @@ def test_scaled_copies_are_larger_or_smaller():
 def test_shuffled_labels_of_pictures_give_chance(tmp_path):
     with Context(Settings(tmp_path, quick=True, backbone=_SQUEEZENET)) as context:
         cache = FeatureCache(context)
-        train, test = (cache(picture_data.virtual(context, count, 1, use=use)) for count, use in ((16, "training"), (8, "testing")))
+        train, test = (cache(picture_data.virtual(context, count, 1, use=use)) for count, use in ((10, "training"), (6, "testing")))
     pooled = [image_recognition.pooled(pictures, cache.backbone.maps) for pictures in (train, test)]
     learned = image_head.train(train, 5, 1).accuracy(test)
-    found = controls.control([[image_head.train(_shuffled(pooled[0], seed), 5, seed).accuracy(pooled[1]) for seed in range(40)]], 0.2)
+    found = controls.control([[image_head.train(_shuffled(pooled[0], seed), 5, seed).accuracy(pooled[1]) for seed in range(20)]], 0.2)
     assert learned > found.found.value + 0.2
     assert found.is_chance, found.words()
 

@@ -86,3 +86,7 @@ def test_the_results_page_has_every_number_of_its_report():
             "| x | 50.0 % (? to 60.0) | shown without numbers | w |",
                  "| 1 | x\\|y |", "\nn\n"):
         assert part in text
+    # A section of an earlier page stays where no report has its experiment, and goes where one has.
+    earlier = "# Old\n\n## Fusion of touch and sight\n\nold fusion\n\n## A million samples, streamed into training\n\nold stream\n"
+    later = results_page.page([report], "On a day.", earlier)
+    assert "old stream" in later and "old fusion" not in later

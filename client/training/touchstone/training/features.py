@@ -53,10 +53,12 @@ def moments(data: TouchData, rows: np.ndarray) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class FeatureSets:
-    """Attributes:
+    """Of touches, or of pictures, each of which is a set of its own.
+
+    Attributes:
       values: (M, F) what a recogniser sees.
       objects: (M,) what it is to say.
-      poses: (M, touches) a number for the commanded pose of each touch; the same for every round and every source.
+      poses: (M, touches), of pictures (M,), a number for each commanded pose; the same for every round, source and scaled copy.
     """
 
     values: np.ndarray

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from .features import FeatureSets
 from .separation import check
 
 UNITS = 128
@@ -16,29 +17,6 @@ EPOCHS = 4
 VALIDATION = 0.2
 # Left open by the seed: pictures a step.
 BATCH = 32
-
-
-@dataclasses.dataclass(frozen=True)
-class SeenPictures:
-    """Attributes:
-      values: (N, F) features.
-      objects: (N,) what is to be said.
-      poses: (N,) a number for the pose of the camera, the same for copies of one picture.
-    """
-
-    values: np.ndarray
-    objects: np.ndarray
-    poses: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.objects)
-
-    def __getitem__(self, rows) -> SeenPictures:
-        return SeenPictures(self.values[rows], self.objects[rows], self.poses[rows])
-
-
-def joined(*parts: SeenPictures) -> SeenPictures:
-    return SeenPictures(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("values", "objects", "poses")))
 
 
 @dataclasses.dataclass
@@ -58,17 +36,17 @@ class Head:
     validation: np.ndarray
     trained_poses: np.ndarray
 
-    def probabilities(self, pictures: SeenPictures) -> np.ndarray:
+    def probabilities(self, pictures: FeatureSets) -> np.ndarray:
         """(N, classes); each row adds up to 1. separation.Leak if one of them was trained on."""
         check(self.trained_poses, pictures.poses)
         with torch.no_grad():
             return torch.softmax(self.network(_tensor(pictures.values, self.mean, self.deviation)), 1).double().numpy()
 
-    def accuracy(self, pictures: SeenPictures) -> float:
+    def accuracy(self, pictures: FeatureSets) -> float:
         return float(np.mean(self.probabilities(pictures).argmax(1) == pictures.objects))
 
 
-def train(pictures: SeenPictures, classes: int, seed: int, epochs: int = EPOCHS) -> Head:
+def train(pictures: FeatureSets, classes: int, seed: int, epochs: int = EPOCHS) -> Head:
     """Pictures of one pose, as copies of one picture are, stay together on one side of the split. From the features
     goes their mean over those trained on, and one number scales them all: a pixel of a map that is black in all of these would have
     no deviation of its own."""

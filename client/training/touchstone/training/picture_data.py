@@ -22,7 +22,7 @@ import touchstone
 from . import plans
 from .backbone import Backbone
 from .context import Context
-from .image_head import SeenPictures
+from .features import FeatureSets
 from .separation import command_numbers, pose_seed
 from .settings import SUPERSHAPES
 
@@ -165,9 +165,9 @@ class FeatureCache:
         self._folder: pathlib.Path = context.settings.out / "features"
         self.pictures, self.seconds = 0, 0.0
 
-    def __call__(self, pictures: Pictures) -> SeenPictures:
+    def __call__(self, pictures: Pictures) -> FeatureSets:
         """Their features, objects and poses."""
-        return SeenPictures(self._features(pictures), pictures.object, pictures.poses)
+        return FeatureSets(self._features(pictures), pictures.object, pictures.poses)
 
     def _features(self, pictures: Pictures) -> np.ndarray:
         """(N, F) float32."""

@@ -1,6 +1,7 @@
-"""RESULTS.md from reports: python -m touchstone.training.results_page --note TEXT report.json ... > RESULTS.md
+"""RESULTS.md from reports: python -m touchstone.training.results_page --note TEXT [--earlier RESULTS.md] report.json ... > new.md
 
-Every number of the page is one of a report; a later report's experiment takes the place of an earlier one's.
+Every number of the page is one of a report; a later report's experiment takes the place of an earlier one's, and sections
+of an earlier page stay where no report has their experiment.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ _FIRST = ("better_model", "touches_to_be_sure", "calibrated_answers", "other_rig
 _FIGURES = {"better_model": "![accuracy on each step of three ladders, and what single effects cost](ladder.svg)"}
 
 
-def page(reports: Sequence[Mapping[str, Any]], note: str) -> str:
-    """Of report.json files, as they were read; `note` says where and when."""
+def page(reports: Sequence[Mapping[str, Any]], note: str, earlier: str = "") -> str:
+    """Of report.json files, as they were read; `note` says where and when; `earlier`: the text of another such page."""
+    kept = dict(section.split("\n", 1) for section in earlier.split("\n## ")[1:])
+    titles = {each.name: each.title for each in experiments()}
     found = {each["name"]: (each, report) for report in reports for each in report["experiments"]}
-    names = [*_FIRST, *(each.name for each in experiments() if each.name not in _FIRST)]
+    names = [*_FIRST, *(name for name in titles if name not in _FIRST)]
     parts = ["# What the experiments found", "", *_wrapped(
         f"{note} Each experiment names the command that made its tables and its seeds; intervals are 95 % over them. The rig is the emulated "
         "one: **nothing here was measured on anything.** The emulated touches were made once, so that another measurement may differ by more "
@@ -30,6 +33,8 @@ def page(reports: Sequence[Mapping[str, Any]], note: str) -> str:
     for name in names:
         if name in found:
             parts += ["", *_section(*found[name])]
+        elif titles[name] in kept:
+            parts += ["", f"## {titles[name]}", *kept[titles[name]].rstrip("\n").split("\n")]
     return "\n".join(parts) + "\n"
 
 
@@ -77,8 +82,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m touchstone.training.results_page", description=__doc__)
     parser.add_argument("reports", nargs="+", type=pathlib.Path, metavar="REPORT.json")
     parser.add_argument("--note", required=True, help="when, at which commit and on what machine")
+    parser.add_argument("--earlier", type=pathlib.Path, metavar="RESULTS.md", help="whose sections stay where no report has the experiment")
     options = parser.parse_args()
-    print(page([json.loads(path.read_text()) for path in options.reports], options.note), end="")
+    earlier = options.earlier.read_text(encoding="utf-8") if options.earlier else ""
+    print(page([json.loads(path.read_text()) for path in options.reports], options.note, earlier), end="")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 
 from . import fusion_rules, image_head, recognisers
 from .features import FeatureSets, drawn_sets
-from .image_head import Head, SeenPictures
+from .image_head import Head
 from .measured_sets import split
 from .touch_data import TouchData
 
@@ -45,12 +45,12 @@ def by_touch(seed: int, train: FeatureSets, validation: FeatureSets, test: Featu
     return Sense(*(Said(recogniser.probabilities(sets), sets.objects) for sets in (test, validation)))
 
 
-def by_image(head: Head, validation: SeenPictures, test: SeenPictures) -> Sense:
+def by_image(head: Head, validation: FeatureSets, test: FeatureSets) -> Sense:
     """`validation`: pictures that the head was not trained on."""
     return Sense(*(Said(head.probabilities(pictures), pictures.objects) for pictures in (test, validation)))
 
 
-def by_pictures(train: SeenPictures, classes: int, seed: int, test: SeenPictures) -> Sense:
+def by_pictures(train: FeatureSets, classes: int, seed: int, test: FeatureSets) -> Sense:
     """A head trained on these pictures, validated on a fifth of them that it kept."""
     head = image_head.train(train, classes, seed)
     return by_image(head, train[head.validation], test)

@@ -7,7 +7,7 @@ import numpy as np
 from .. import figures, image_head, paired
 from ..context import Context
 from ..experiment import Experiment
-from ..image_head import SeenPictures, joined
+from ..features import FeatureSets, joined
 from ..picture_data import FeatureCache, Pictures, measured, scaled, virtual
 from ..result import Comparison, Result, Table
 from ..settings import SUPERSHAPES
@@ -32,12 +32,12 @@ class MeasuredFeatures:
         changed = cache(scaled(self.pool, COPIES, np.random.default_rng(context.settings.seed)))
         self.copies = [changed[np.arange(len(self.pool)) * COPIES + k] for k in range(COPIES)]
 
-    def training(self, rows: np.ndarray, copies: int) -> SeenPictures:
+    def training(self, rows: np.ndarray, copies: int) -> FeatureSets:
         """These pictures and the first `copies` of each."""
         return joined(self.seen[rows], *(each[rows] for each in self.copies[:copies]))
 
 
-def train_with(features: SeenPictures, real: MeasuredFeatures, rows: np.ndarray, copies: int, seed: int) -> image_head.Head:
+def train_with(features: FeatureSets, real: MeasuredFeatures, rows: np.ndarray, copies: int, seed: int) -> image_head.Head:
     """A head on virtual and measured pictures; `rows` of the latter."""
     return image_head.train(joined(features, real.training(rows, copies)), CLASSES, seed)
 

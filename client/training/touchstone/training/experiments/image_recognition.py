@@ -10,7 +10,7 @@ import numpy as np
 from .. import controls, figures, image_head, paired
 from ..context import Context
 from ..experiment import Experiment
-from ..image_head import SeenPictures
+from ..features import FeatureSets
 from ..picture_data import FeatureCache, Pictures, measured, split, virtual
 from ..result import Comparison, Result
 from ..settings import SUPERSHAPES
@@ -42,7 +42,7 @@ def measured_split(context: Context, pool: Pictures, seed: int) -> tuple[np.ndar
     return np.random.default_rng([seed, 296]).permutation(training)[: size.measured_train], testing
 
 
-def pooled(pictures: SeenPictures, maps: int) -> SeenPictures:
+def pooled(pictures: FeatureSets, maps: int) -> FeatureSets:
     """The mean of each map instead of its pixels."""
     means = pictures.values.reshape(len(pictures), maps, -1).mean(2)
     return dataclasses.replace(pictures, values=means)
