@@ -79,7 +79,8 @@ def test_the_results_page_has_every_number_of_its_report():
     result = {"name": "fusion", "title": "Fusion", "made_on": ["a"], "words": ["It is 5 %."], "seconds": 3.0, "data": {}, "figures": [],
               "comparisons": [{"what": "x", "ours": {"value": 0.5, "low": None, "high": 0.6}, "seeds": None, "made_on": "m", "why": "w"}],
               "tables": [{"title": "T", "columns": ["a", "b"], "rows": [["1", "x|y"]], "note": "n"}]}
-    report = {"about": ["Seeds 1 to 4; intervals"], "command": "python -m touchstone.training fusion --seeds 4", "experiments": [result]}
+    report = {"about": ["Seeds 1 to 4; intervals"], "command": "python -m touchstone.training all --out /tmp/x --seeds 4",
+              "experiments": [result]}
     text = results_page.page([json.loads(json.dumps(report))], "On a day.")
     for part in (
             "`python -m touchstone.training fusion --seeds 4`, 4 seeds, 3 s", "- It is 5 %.",

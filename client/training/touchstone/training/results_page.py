@@ -10,6 +10,7 @@ import argparse
 import json
 import pathlib
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -42,7 +43,8 @@ def _section(result: Mapping[str, Any], report: Mapping[str, Any]) -> list[str]:
     seeds = re.search(r"Seeds (\d+) to (\d+)", " ".join(report["about"]))
     count = int(seeds[2]) - int(seeds[1]) + 1 if seeds else 0
     parts = [f"## {result['title']}", "",
-             f"`{report['command']}`, {count} seeds, {result['seconds']:.0f} s. Made on: {'; '.join(result['made_on'])}.", ""]
+             (f"`{_command(report['command'], result['name'])}`, {count} seeds, {result['seconds']:.0f} s. "
+              f"Made on: {'; '.join(result['made_on'])}."), ""]
     if result["name"] in _FIGURES:
         parts += [_FIGURES[result["name"]], ""]
     parts += [f"- {words}" for words in result["words"]]
@@ -53,6 +55,17 @@ def _section(result: Mapping[str, Any], report: Mapping[str, Any]) -> list[str]:
         if table["note"]:
             parts += ["", table["note"]]
     return parts
+
+
+def _command(line: str, name: str) -> str:
+    """The command that makes this experiment alone as that line did: its options without the folder, files by their names."""
+    words = shlex.split(line)
+    first = next((k for k, word in enumerate(words) if word.startswith("--")), len(words))
+    options = words[first:]
+    if "--out" in options:
+        place = options.index("--out")
+        options = options[:place] + options[place + 2:]
+    return " ".join(["python -m touchstone.training", name, *(pathlib.PurePath(word).name for word in options)])
 
 
 def _compared(each: Mapping[str, Any]) -> list[str]:
