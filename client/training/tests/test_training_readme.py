@@ -55,8 +55,8 @@ def test_the_tables_numbers_are_those_of_the_code(tmp_path):
             f"poses are parted, so {960 - 5 * round(noise_in_training.TEST_SHARE * 192)} of 960",
             f"{plans.SIGMA_US / 1e6:g} as the standard deviation", f"{plans.SIGMA_US / 1e6 * 20:.2f} mm at our speed", "**20 mm/s, 30 mm**",
             f"averaged to {backbone.MAP_SIDE} x {backbone.MAP_SIDE}", f"{sizes.train_per_object} an object",
-            f"{sizes.measured_train} in training, {image_augmentation.COPIES * sizes.measured_train} scaled copies "
-            f"({(1 + image_augmentation.COPIES) * sizes.measured_train} together), {sizes.measured_test} in testing",
+            (f"{sizes.measured_train} in training, {image_augmentation.COPIES * sizes.measured_train} scaled copies "
+             f"({(1 + image_augmentation.COPIES) * sizes.measured_train} together), {sizes.measured_test} in testing"),
             f"({fusion.per_set(Context(Settings(tmp_path)))} here)"):
         assert said in README, said
     assert "spacing_mm: 30" in plans.NOISY and plans.measured(Settings(tmp_path)).samples(5) == 960
