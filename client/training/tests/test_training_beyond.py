@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import subprocess
 import types
 from typing import Any
 
@@ -11,7 +12,8 @@ import pytest
 pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.training needs it.")
 
 import touchstone
-from touchstone.training import calibration, ladder, plans, recognisers, sequential
+from touchstone.own_server import find_server
+from touchstone.training import calibration, ladder, ladder_words, plans, recognisers, sequential
 from touchstone.training.experiments import other_rigs
 from touchstone.training.prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
 from touchstone.training.touch_data import collect
@@ -202,6 +204,8 @@ def test_the_ladder_adds_one_effect_of_the_report_after_the_other():
     assert [("tip_radius" in m, "object_push" in m, "lookup" in m) for m in models] == [
         (False, False, False), (True, False, False), (True, True, False), (True, True, True)]
     assert all(m.count("gaussian_noise") == 1 for m in models)
+    # Terms stand in the order of the file, in which they were fitted; the last rungs are the files that are saved.
+    assert models[2:] == (improved, improved + lookup)
     assert "sigma_us: 7000" in ladder.with_noise(models[-1], 7000) and "gaussian_noise" not in ladder.with_noise(models[-1], 0)
     assert ladder.with_noise(ladder.NOMINAL, 0).endswith("effects: []\n")
 
@@ -217,6 +221,38 @@ def test_what_any_number_of_fingers_sees_of_a_sphere():
         else:  # 1 / radius, up to the sphere's departure from a parabola
             assert values.shape == (1, fingers - 2)
             np.testing.assert_allclose(values, 1e3 / radius, rtol=0.15)
+
+
+def test_the_last_rung_is_what_the_command_line_saves(client, tmp_path):
+    """Of a set with a lead screw that is no effect, touched anew."""
+    rig = ladder.with_noise(ladder.NOMINAL, 5000) + (
+        "  - tip_radius: {radius_mm: 3}\n  - formula:\n      name: screw\n      adds: travel_mm\n      expression: \"k * sin(2*pi*travel_mm/5)\"\n"
+        "      parameters:\n        k: {value: 0.5, unit: mm, min: -1, max: 1}\n")
+    context: Any = types.SimpleNamespace(simulator=client)
+    data = collect(client, ladder.DIAGNOSED, touchstone.faces(samples_per_face=8, rounds=1), 96, model=rig, seed=4)
+    ladder.write_set(data, tmp_path / "set.csv")
+    (tmp_path / "nominal.yaml").write_text(ladder.NOMINAL)
+    rungs = ladder.models(context.simulator.diagnose(tmp_path / "set.csv", ladder.NOMINAL, seed=1))
+    program = pathlib.Path(find_server()).parent / "touchstone"
+    subprocess.run([str(program), "diagnose", "set.csv", "--model", "nominal.yaml", "--save-model", "nominal_better.yaml", "--with-formula"],
+                   cwd=tmp_path, check=True, capture_output=True)
+    terms = lambda model: model.partition("effects:")[2]
+    assert len(rungs) >= 3
+    assert terms(rungs[-1][1]) == terms((tmp_path / "nominal_better.yaml").read_text())
+
+
+@pytest.mark.parametrize("changes, said", [
+    ([0.5, 0.6, 0.4], ["recognises more", "HARMS: recognises less"]), ([0.5, 0.5, 0.6], ["no difference can be told", "recognises more"])])
+def test_a_step_that_harms_is_called_so(changes, said):
+    rng = np.random.default_rng(1)
+    accuracy = np.array(changes) + rng.normal(0, 0.001, (8, 1)) + rng.normal(0, 0.002, (8, 3))
+    rungs = [ladder.Rung(name, "", rmse) for name, rmse in (("nominal", 40e3), ("+ a", 20e3), ("+ b", 21e3))]
+    climb = ladder_words.Climb(ladder.RIGS[0], rungs, 100, 200, {
+        "rig": accuracy, "simulated": accuracy, "again": accuracy, "ranks": np.full((8, 3), np.nan)})
+    assert [climb.judgement(1), climb.judgement(2)] == [said[0], said[1] + ", and the RMSE rises"]
+    first = ladder_words.words([climb] * 3, {"x": (1.0, [0.0] * 8), "y": (1.0, [0.0] * 8)}, {
+        name: [{"gain": (1, 1, 1)}] * 2 for name in ("mean curvature", "accuracy")}, "emulated", 10)[0]
+    assert "b of the first rig" in first and "3 rigs" in first
 
 
 @pytest.fixture(scope="module")
@@ -243,10 +279,10 @@ def test_shuffled_labels_give_chance_and_true_ones_do_not(client, fingers):
     rng = np.random.default_rng(1)
     train, test = (other_rigs._sets(other_rigs._columns(client, other_rigs.lines(67, seed), seed, rig.model), 20.0, rng)
                    for seed in (1, 2))
-    of = lambda labels: np.mean(recognisers.SEEDS["naive Bayes"](1).fit(train[0], labels).predict(test[0]) == test[1])
-    shuffled = [of(rng.permutation(train[1])) for _ in range(60)]
+    of = lambda sets: recognisers.accuracy(recognisers.SEEDS["naive Bayes"](1), sets, test)
+    shuffled = [of(recognisers.shuffled(train, rng)) for _ in range(60)]
     assert abs(np.mean(shuffled) - 0.2) < 4 * np.std(shuffled) / np.sqrt(60)
-    assert of(train[1]) > 0.2 + 4 * np.std(shuffled)
+    assert of(train) > 0.2 + 4 * np.std(shuffled)
 
 
 def test_simulated_touches_come_from_all_sides_alike(client):

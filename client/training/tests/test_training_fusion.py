@@ -5,7 +5,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from touchstone.training import fusion_rules
+from touchstone.training import fusion_rules, two_senses
 from touchstone.training.context import Context
 from touchstone.training.experiments import fusion
 from touchstone.training.settings import Settings
@@ -45,10 +45,14 @@ def test_pairs_are_of_one_object_and_all_of_them():
 
 
 def test_the_weight_is_chosen_on_validation_data_alone():
-    right, wrong, objects = np.eye(5) * 0.8 + 0.04, np.roll(np.eye(5), 1, 1) * 0.8 + 0.04, np.arange(5)
+    said = lambda probabilities: two_senses.Said(probabilities, np.arange(5))
+    right, wrong = said(np.eye(5) * 0.8 + 0.04), said(np.roll(np.eye(5), 1, 1) * 0.8 + 0.04)
     # In validation touch knows and sight errs, in the test it is the other way round: the weight must not follow the test.
-    found = fusion.fused((wrong, objects), (right, objects), (right, objects), (wrong, objects))
-    assert (found["weight"], found["touch"], found["image"], found["weighted sum"]) == (1.0, 0.0, 1.0, 0.0)
+    found = two_senses.fused(two_senses.Sense(wrong, right), two_senses.Sense(right, wrong))
+    assert found.accuracy == {"touch": 0.0, "image": 1.0, "product": found.accuracy["product"], "weighted sum": 0.0} and found.weight == 1.0
+    # The sweep shows what every weight would have given on the test.
+    assert (found.sweep[0], found.sweep[-1]) == (1.0, 0.0) and len(found.sweep) == len(fusion_rules.WEIGHTS)
+    assert np.trace(found.confusion["image"]) == 5 and np.trace(found.confusion["touch"]) == 0
 
 
 def _touches(count):
@@ -58,30 +62,18 @@ def _touches(count):
                      None, 20.0, 30.0)
 
 
-def test_no_measured_touch_is_in_training_and_testing():
-    touches = _touches(200)
+def test_no_pose_of_a_measured_touch_is_in_two_parts():
+    touches = _touches(400)[np.tile(np.arange(400), 3)]  # three rounds
     for seed in range(10):
-        training, testing = fusion.halves(touches, seed)
-        assert not set(training.target_mm[:, 0]) & set(testing.target_mm[:, 0])
-        assert len(training) + len(testing) == 200 and np.bincount(testing.object).tolist() == [20] * 5
+        found = fusion.measured_touches(touches, 5, np.random.default_rng(seed))
+        train, validation, test = (set(sets.poses.ravel()) for sets in (found.train, found.validation, found.test))
+        assert not train & validation and not train & test and not validation & test
+        assert found.touches == 160
 
 
-def test_repeats_of_a_pose_are_not_divided():
-    touches = _touches(100)[np.tile(np.arange(100), 4)]
-    training, testing = fusion.halves(touches, 1)
-    assert not set(training.target_mm[:, 0]) & set(testing.target_mm[:, 0])
-    assert (len(training), len(testing)) == (200, 200)
-
-
-def test_a_touch_recogniser_is_validated_on_the_last_source_and_not_trained_on_that():
-    rng = np.random.default_rng(1)
-    virtual = rng.normal(size=(50, 3)), np.arange(50) % 5
-    # The measured sets hold nothing but chance: whatever is recognised of them beyond it was seen in training.
-    measured = rng.normal(size=(400, 3)), rng.integers(0, 5, 400)
-    found = fusion.TouchRecogniser(1, virtual, measured)
-    probabilities, objects = found.validation
-    assert len(objects) == pytest.approx(80, abs=3)
-    assert np.mean(probabilities.argmax(1) == objects) < 0.4 < np.mean(found.probabilities(measured[0]).argmax(1) == measured[1])
+def test_virtual_validation_shares_no_touch_with_training():
+    train, validation = two_senses.virtual_sets(_touches(640), 15, np.random.default_rng(1))
+    assert len(train) == 640 and not set(train.poses.ravel()) & set(validation.poses.ravel())
 
 
 @pytest.mark.second_tier("statistical: recognition rates over seeds")
@@ -91,5 +83,5 @@ def test_two_senses_beat_each_alone(tmp_path):
         cache = fusion.FeatureCache(context)
         runs = [fusion.all_virtual(context, cache, seed) for seed in range(1, 4)]
     for alone in ("touch", "image"):
-        gained = [run["product"] - run[alone] for run in runs]
-        assert np.mean(gained) > 0, (alone, runs)
+        gained = [run.accuracy["product"] - run.accuracy[alone] for run in runs]
+        assert np.mean(gained) > 0, (alone, [run.accuracy for run in runs])

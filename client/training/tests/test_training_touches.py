@@ -31,17 +31,35 @@ def test_curvature_of_a_sphere():
     assert concave.curvature() == pytest.approx([-1e3 / radius_mm], rel=1e-4)
 
 
-def test_a_touch_is_in_one_set_at_most_and_of_one_object():
+def test_recognisers_are_given_curvatures_or_contact_times_themselves():
+    times_us = np.random.default_rng(1).integers(0, 500_000, (40, 3)).astype(float)
+    data = made_of([0, 1] * 20, times_us)
+    rows = np.array([[0, 2, 4, 6, 8], [1, 3, 5, 7, 9]])
+    seen = features.curvatures(data, rows) * features.RANGE_PER_M
+    for values, row in zip(seen, rows):
+        assert values == pytest.approx(np.sort(data.curvature()[row]))
+    assert features.triples(data, rows).reshape(2, 5, 3) * 1e5 == pytest.approx(times_us[rows])
+
+
+def test_a_set_has_no_order():
+    data = made_of([0] * 10, np.random.default_rng(1).uniform(0, 1e6, (10, 3)))
+    rows = np.arange(10)[None]
+    assert np.array_equal(features.curvatures(data, rows), features.curvatures(data, rows[:, ::-1]))
+
+
+def test_a_dealt_touch_is_in_one_set_at_most_and_of_one_object():
     data = made_of([0] * 23 + [1] * 40, np.arange(189.0).reshape(63, 3))
-    whole, objects = features.feature_sets(data, 5, np.random.default_rng(0), features=lambda curvature: curvature)
-    assert len(whole) == 4 + 8 and sorted(objects) == [0] * 4 + [1] * 8
-    with pytest.raises(ValueError, match="6 sets of 5 touches of o0 are wanted, there are 4"):
-        features.feature_sets(data, 5, np.random.default_rng(0), sets=12)
+    rows = features.dealt_rows(data, 5, np.random.default_rng(0))
+    assert len(rows) == 4 + 8 and len(np.unique(rows)) == rows.size
+    assert all(len(set(data.object[row])) == 1 for row in rows)
+    with pytest.raises(ValueError, match="13 sets are wanted, there are 12"):
+        features.some(features.dealt_sets(data, 5, np.random.default_rng(0)), 13, np.random.default_rng(0))
 
 
 def test_histograms_hold_every_touch_however_far_out():
-    curvature = np.array([[-1e9, -59.9, 0.1, 59.9, 1e9]])
-    counts = 5 * features.histogram(curvature)
+    times_us = np.zeros((5, 3))
+    times_us[:, 0] = np.array([-1e9, -59.9, 0.1, 59.9, 1e9]) / 1e3 * 900 / 20 * 1e6
+    counts = 5 * features.histogram(made_of([0] * 5, times_us), np.arange(5)[None])
     assert counts.sum() == 5 and counts[0, 0] == 2 and counts[0, -1] == 2
 
 
@@ -50,7 +68,7 @@ def test_rounds_of_a_pose_are_on_one_side_of_a_split():
     targets = np.tile(rng.normal(size=(20, 3)), (4, 1))  # 20 poses in 4 rounds
     data = made_of([0, 1] * 40, targets=targets)
     train, test = measured_sets.split(data, 0.4, rng)
-    pose = measured_sets.poses(data)
+    pose = data.poses()
     assert not set(pose[train]) & set(pose[test])
     assert len(train) + len(test) == 80 and len(test) == 32
     loose_train, loose_test = measured_sets.split(data, 0.4, rng, by_pose=False)
@@ -59,12 +77,17 @@ def test_rounds_of_a_pose_are_on_one_side_of_a_split():
 
 def test_drawn_sets_are_of_different_touches_of_one_object():
     data = made_of([0] * 20 + [1] * 20, np.column_stack([np.arange(40.0) * 1e6] * 2 + [np.zeros(40)]))
-    seen, objects = measured_sets.drawn_sets(data, 15, 30, np.random.default_rng(5), features=lambda curvature: curvature)
-    for row, k in zip(seen, objects):
+    seen = features.drawn_sets(data, 15, 30, np.random.default_rng(5), features.curvatures_as_touched)
+    for row, k in zip(seen.values * features.RANGE_PER_M, seen.objects):
         assert len(set(row)) == 15
-        assert set(row) <= set(data.curvature()[data.object == k])
+        assert set(row.round(6)) <= set(data.curvature()[data.object == k].round(6))
     with pytest.raises(ValueError, match="sets of 21 touches of o0"):
-        measured_sets.drawn_sets(data, 21, 2, np.random.default_rng(5))
+        features.drawn_sets(data, 21, 2, np.random.default_rng(5))
+
+
+def test_a_part_has_of_every_object_as_many():
+    data = made_of([0] * 50 + [1] * 60)
+    assert np.bincount(measured_sets.part(data, 41, np.random.default_rng(1)).object).tolist() == [21, 20]
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +95,7 @@ def pools(tmp_path_factory):
     """(simulated without noise, with noise, emulated) touches: as the experiments have them, fewer."""
     with Context(Settings(tmp_path_factory.mktemp("training"), quick=True, rig=os.environ.get("TOUCHSTONE_RIG", ""))) as context:
         context.begin("test")
-        size = 300 * 20 + 500
-        yield (context.simulated(size, model=plans.IDEAL), context.simulated(size, model=plans.NOISY),
+        yield (context.simulated(640, model=plans.IDEAL), context.simulated(640, model=plans.NOISY),
                context.measured(plans.measured(context.settings), options=(*plans.RIG, "--speedup", "60")))
 
 
@@ -87,10 +109,10 @@ def accuracies(pool, rig, touches, shuffle=False):
     found = []
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        train = features.feature_sets(pool, touches, rng, sets=300)
+        train = features.drawn_sets(pool, touches, 640, rng)
         if shuffle:
-            train = train[0], rng.permutation(train[1])
-        found.append(recognisers.accuracy(recognisers.SEEDS["XGBoost"](seed), train, measured_sets.drawn_sets(rig, touches, 400, rng)))
+            train = recognisers.shuffled(train, rng)
+        found.append(recognisers.accuracy(recognisers.SEEDS["XGBoost"](seed), train, features.drawn_sets(rig, touches, 400, rng)))
     return np.array(found)
 
 

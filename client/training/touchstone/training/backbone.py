@@ -1,8 +1,9 @@
 """A frozen image network from an ONNX file, run by OpenCV: pictures in, features out.
 
-What is taken as features: the input of the last fully-connected layer, the penultimate activations, where the network
-ends in one (ResNet-50: 2048 numbers); else its output, the raw scores of a network without such a layer (SqueezeNet
-1.0: 1000) or the activations of one whose last layer was cut off.
+What is taken as features: the last maps of the network, flattened, as the seed does: the activations before pooling and
+classification (ResNet-50: 2048 maps of 7 x 7, 100,352 numbers). Maps of more pixels are reduced to 7 x 7 by averaging
+(SqueezeNet 1.0: 512 maps of 13 x 13, so 25,088 numbers). Where the classifier is a convolution before the last pooling, as
+SqueezeNet's, its scores are no maps of features: the maps are those that go into it. A network without maps gives its output.
 
 How pictures are prepared. The size is the file's own input size, 224 where that is open. An ONNX file does not say how
 its pixels are to be scaled. FILE.onnx.json beside it may: {"mean": [r, g, b], "deviation": [r, g, b], "order": "rgb"},
@@ -22,10 +23,12 @@ import queue
 
 import cv2
 import numpy as np
+import torch
+from torch import nn
 
 from . import onnx_file
 
-_NOT_FEATURES = {"Softmax", "Flatten", "Identity", "Reshape", "Squeeze", "LogSoftmax", "Dropout"}
+MAP_SIDE = 7  # of ResNet-50's last maps, pixels
 
 
 class NoNetwork(ValueError):
@@ -49,7 +52,8 @@ class Backbone:
     """Attributes:
       side_px: of the square pictures that the network is given.
       preparation: how pixels are scaled.
-      layer: whose output the features are; "": the network's own.
+      layer: whose maps the features are; "": the network's own output.
+      maps: how many of them; 0: it has none.
       digest: of the file and of the preparation.
     """
 
@@ -69,16 +73,36 @@ class Backbone:
         try:
             for _ in range(self._workers):
                 self._nets.put(cv2.dnn.readNetFromONNX(str(path)))
-            self.layer = _feature_layer(self._nets.queue[0])
+            self.layer, self.maps = self._find_maps()
             self.features_count = self._one(np.zeros((8, 8, 1), np.uint8)).size
         except cv2.error as error:
             raise NoNetwork(_refusal(path, f"OpenCV {cv2.__version__} cannot run it: {error.err}")) from error
-        self.digest = hashlib.sha256(path.read_bytes() + repr(self.preparation).encode()).hexdigest()
+        self.digest = hashlib.sha256(path.read_bytes() + repr((self.preparation, self.layer, MAP_SIDE)).encode()).hexdigest()
 
     def __str__(self) -> str:
-        what = "input of the last fully-connected layer" if self.layer else "raw output"
+        what = f"{self.maps} maps, flattened" if self.layer else "raw output"
         convention = {CAFFE: "Caffe's", TORCHVISION: "torchvision's"}.get(self.preparation, "its own")
         return f"{self.path.name} ({what}, {self.features_count:,} numbers; {self.side_px} x {self.side_px} pixels, {convention} scaling)"
+
+    def _find_maps(self) -> tuple[str, int]:
+        """The layer with the last maps of features, and how many; "" and 0 where there are none."""
+        net = self._nets.queue[0]
+        net.setInput(prepare(np.zeros((8, 8, 1), np.uint8), self.side_px, self.preparation))
+        names = list(net.getLayerNames())
+        kinds = [net.getLayer(net.getLayerId(name)).type for name in names]
+        output = net.forward().size
+        classifies = not {"InnerProduct", "MatMul", "Gemm"} & set(kinds)  # perhaps by a convolution
+        skip = False
+        for place in reversed(range(len(names))):
+            shape = net.forward(names[place]).shape
+            if len(shape) != 4 or max(shape[2:]) == 1:
+                continue
+            # The scores of a classifier: a convolution, or what is made of its output number by number.
+            skip = classifies and shape[1] == output and kinds[place] in ("Convolution", "ReLU", "ReLU6", "Dropout", "Identity")
+            classifies = classifies and skip and kinds[place] != "Convolution"
+            if not skip:
+                return names[place], shape[1]
+        return "", 0
 
     def features(self, pictures: np.ndarray) -> np.ndarray:
         """(N, features_count) float32 of (N, height, width, 1 or 3) uint8, grey or red first; the same for the same picture."""
@@ -91,7 +115,10 @@ class Backbone:
         net = self._nets.get()
         try:
             net.setInput(prepare(picture, self.side_px, self.preparation))
-            return (net.forward(self.layer) if self.layer else net.forward()).ravel().copy()
+            found = net.forward(self.layer) if self.layer else net.forward()
+            if found.ndim == 4 and max(found.shape[2:]) > MAP_SIDE:
+                found = nn.functional.adaptive_avg_pool2d(torch.from_numpy(found), MAP_SIDE).numpy()
+            return found.ravel().copy()
         finally:
             self._nets.put(net)
 
@@ -117,14 +144,6 @@ def _preparation(path: pathlib.Path, side_px: int) -> Preparation:
         return result
     except (ValueError, KeyError, TypeError) as error:
         raise NoNetwork(f'{said}: {error}; wanted: {{"mean": [r, g, b], "deviation": [r, g, b], "order": "rgb"}}') from error
-
-
-def _feature_layer(net: cv2.dnn.Net) -> str:
-    """Whose output goes into the last fully-connected layer; "" where the network does not end in one."""
-    names = list(net.getLayerNames())
-    kinds = [net.getLayer(net.getLayerId(name)).type for name in names]
-    last = next((k for k in reversed(range(len(names))) if kinds[k] not in _NOT_FEATURES), 0)
-    return names[last - 1] if last and kinds[last] in ("InnerProduct", "MatMul", "Gemm") else ""
 
 
 def _refusal(path: pathlib.Path, why: str) -> str:

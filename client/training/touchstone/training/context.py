@@ -16,6 +16,7 @@ import touchstone
 
 from . import plans
 from .emulated_rig import EmulatedRig
+from .separation import pose_seed
 from .settings import SUPERSHAPES, Settings
 from .touch_data import TouchData, collect
 
@@ -61,20 +62,21 @@ class Context:
         self._rigs = {}
 
     def simulated(self, samples: int, *, plan: Any = None, objects: Sequence[str] = SUPERSHAPES, model: str | None = None,
-                  seed: int = 1, image: Any = None) -> TouchData:
-        """`samples` touches of all objects together, in turn, by the simulator; `plan` None: of plans.simulated()."""
+                  seed: int = 1, use: str = "training", image: Any = None) -> TouchData:
+        """`samples` touches of all objects together, in turn, by the simulator; `plan` None: of plans.simulated(). Touches of
+        another `use`, as "testing", are of other poses, whatever their seed."""
         plan = plans.simulated(samples, len(objects)) if plan is None else plan
-        return collect(self.simulator, objects, plan, samples, model=model, seed=seed, image=image)
+        return collect(self.simulator, objects, plan, samples, model=model, seed=pose_seed(use, seed), image=image)
 
     def measured(self, plan: Any, *, objects: Sequence[str] = SUPERSHAPES, options: Sequence[str] = (), seed: int = 1,
                  image: Any = None) -> TouchData:
         """Every touch of the plan by the rig behind the gateway. Kept in the folder of the run: an arm takes its time."""
-        what = json.dumps([list(objects), repr(plan), list(options), seed, repr(image), self.settings.rig])
+        what = json.dumps([list(objects), repr(plan), list(options), pose_seed("rig", seed), repr(image), self.settings.rig])
         path = self.settings.out / "measured" / f"{hashlib.sha256(what.encode()).hexdigest()[:16]}.npz"
         if path.exists():
             return TouchData.load(path)
         self.progress(0, f"touching {plan.samples(len(objects)):,} times with the rig")
-        found = collect(self.rig(*options), objects, plan, plan.samples(len(objects)), seed=seed, image=image)
+        found = collect(self.rig(*options), objects, plan, plan.samples(len(objects)), seed=pose_seed("rig", seed), image=image)
         path.parent.mkdir(parents=True, exist_ok=True)
         found.save(path)
         return found

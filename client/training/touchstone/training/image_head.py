@@ -8,6 +8,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from .features import FeatureSets
+from .separation import check
+
 UNITS = 128
 LEARNING_RATE = 0.001
 EPOCHS = 4
@@ -23,32 +26,35 @@ class Head:
     Attributes:
       classes: how many.
       validation: (V,) rows of its training set that it was not trained on; of every object the same share.
+      trained_poses: of the pictures that it was trained on.
     """
 
     network: nn.Module
     mean: np.ndarray
-    deviation: np.ndarray
+    deviation: float
     classes: int
     validation: np.ndarray
+    trained_poses: np.ndarray
 
-    def probabilities(self, features: np.ndarray) -> np.ndarray:
-        """(N, classes) of (N, F) features; each row adds up to 1."""
+    def probabilities(self, pictures: FeatureSets) -> np.ndarray:
+        """(N, classes); each row adds up to 1. separation.Leak if one of them was trained on."""
+        check(self.trained_poses, pictures.poses)
         with torch.no_grad():
-            return torch.softmax(self.network(_tensor(features, self.mean, self.deviation)), 1).double().numpy()
+            return torch.softmax(self.network(_tensor(pictures.values, self.mean, self.deviation)), 1).double().numpy()
 
-    def accuracy(self, features: np.ndarray, objects: np.ndarray) -> float:
-        return float(np.mean(self.probabilities(features).argmax(1) == objects))
+    def accuracy(self, pictures: FeatureSets) -> float:
+        return float(np.mean(self.probabilities(pictures).argmax(1) == pictures.objects))
 
 
-def train(features: np.ndarray, objects: np.ndarray, classes: int, seed: int, epochs: int = EPOCHS,
-          groups: np.ndarray | None = None) -> Head:
-    """Of (N, F) features and (N,) objects. `groups`: (N,) pictures of one group, as copies of one picture are, stay together on
-    one side of the split; default: each is its own. The features are standardised by those trained on."""
+def train(pictures: FeatureSets, classes: int, seed: int, epochs: int = EPOCHS) -> Head:
+    """Pictures of one pose, as copies of one picture are, stay together on one side of the split. From the features
+    goes their mean over those trained on, and one number scales them all: a pixel of a map that is black in all of these would have
+    no deviation of its own."""
     rng = np.random.default_rng(seed)
-    groups = np.arange(len(objects)) if groups is None else groups
+    features, objects, groups = pictures.values, pictures.objects, pictures.poses
     held = np.isin(groups, _validation_groups(groups, objects, classes, rng))
     rows = np.flatnonzero(~held)
-    mean, deviation = features[rows].mean(0), features[rows].std(0) + 1e-6
+    mean, deviation = features[rows].mean(0), float(features[rows].std()) + 1e-6
     generator = torch.Generator().manual_seed(seed)
     network = nn.Sequential(nn.Linear(features.shape[1], UNITS), nn.ReLU(), nn.Linear(UNITS, classes))
     with torch.no_grad():  # PyTorch's own initial values, but drawn from this seed
@@ -63,7 +69,7 @@ def train(features: np.ndarray, objects: np.ndarray, classes: int, seed: int, ep
             optimizer.zero_grad()
             nn.functional.cross_entropy(network(inputs[batch]), targets[batch]).backward()
             optimizer.step()
-    return Head(network.eval(), mean, deviation, classes, np.flatnonzero(held))
+    return Head(network.eval(), mean, deviation, classes, np.flatnonzero(held), np.unique(groups[rows]))
 
 
 def _validation_groups(groups, objects, classes, rng):
@@ -75,4 +81,7 @@ def _validation_groups(groups, objects, classes, rng):
 
 
 def _tensor(features, mean, deviation):
-    return torch.as_tensor((features - mean) / deviation).float()
+    # In place where it can be: a whole run's maps take 200 MB.
+    scaled = features - mean
+    scaled /= deviation
+    return torch.as_tensor(scaled).float()

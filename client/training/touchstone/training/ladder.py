@@ -15,14 +15,39 @@ import numpy as np
 import touchstone
 
 from .context import Context
+from .separation import check
 from .touch_data import TouchData
 
 # An emulated optical sensor's noise, so that what the model lacks is seen beside it (the seed's 48 ms would hide it).
 SIGMA_US = 5000.0
-# Fingers of unequal length, an object that gives way, round tips, and a lead screw that is in no catalogue of effects.
-HIDDEN = ("--hide", "finger_length.offset_mm=-0.3,0.4,-0.1", "--hide", "object_push.shift_mm=0.8", "--hide", "tip_radius.radius_mm=2",
-          "--unlisted", "lead_screw=0.5,5")
-RIG = ("--sigma-us", f"{SIGMA_US:.0f}", *HIDDEN)
+
+
+@dataclasses.dataclass(frozen=True)
+class HiddenRig:
+    """Attributes:
+      name: of it in reports.
+      hidden: its physics, as options of touchstone-rig-emulator; each has one cause that is in no catalogue of effects.
+    """
+
+    name: str
+    hidden: tuple[str, ...]
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        return ("--sigma-us", f"{SIGMA_US:.0f}", *self.hidden)
+
+
+# Chosen before any of them was tried, and not changed afterwards.
+RIGS = (
+    # Fingers of unequal length, an object that gives way, round tips, and a lead screw that is not true.
+    HiddenRig("first rig", ("--hide", "finger_length.offset_mm=-0.3,0.4,-0.1", "--hide", "object_push.shift_mm=0.8", "--hide",
+                            "tip_radius.radius_mm=2", "--unlisted", "lead_screw=0.5,5")),
+    # Larger tips, fingers that slide on oblique surfaces, and a middle finger on a joint that yields to gravity.
+    HiddenRig("second rig", ("--hide", "tip_radius.radius_mm=3", "--hide", "oblique_slip.travel_mm=0.5", "--unlisted", "soft_middle=0.4")),
+    # A tilted tool, fingers of unequal length, an object that gives way a little, and one that tips.
+    HiddenRig("third rig", ("--hide", "tool_tilt.angle_deg=1", "--hide", "finger_length.offset_mm=0.2,-0.3,0.1", "--hide",
+                            "object_push.shift_mm=0.3", "--unlisted", "tipping=0.3")),
+)
 NOMINAL = ("touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
            f"  - gaussian_noise: {{sigma_us: {SIGMA_US:.0f}}}\n")
 STANDOFF_MM = 60.0  # of every plan of faces here
@@ -45,21 +70,24 @@ class Rung:
     rmse_us: float
 
 
-def measured(context: Context) -> tuple[TouchData, TouchData]:
+def measured(context: Context, rig: HiddenRig = RIGS[0]) -> tuple[TouchData, TouchData]:
     """Touches that are diagnosed, of two objects, and others in other poses, of all objects: no model has seen these."""
     per_face, rounds = context.settings.pick((12, 1), (24, 2))
     plan = touchstone.faces(samples_per_face=per_face, rounds=rounds)
     test = touchstone.faces(samples_per_face=context.settings.pick(4, 40), rounds=1)
-    return (context.measured(plan, objects=DIAGNOSED, options=RIG, seed=11), context.measured(test, options=RIG, seed=12))
+    diagnosed = context.measured(plan, objects=DIAGNOSED, options=rig.options, seed=11)
+    held_out = context.measured(test, options=rig.options, seed=12)
+    check(diagnosed.poses(), held_out.poses())
+    return diagnosed, held_out
 
 
-def climb(context: Context) -> list[Rung]:
-    """The ladder from the nominal model on: each effect of the report, then the curve of what is left, if it found one.
+def climb(context: Context, rig: HiddenRig = RIGS[0]) -> list[Rung]:
+    """The ladder from the nominal model to that which `diagnose --save-model` saves.
 
     The effects have the values of the report's improved model, in which they were fitted together. Kept beside the
     measured touches, since three experiments ask for it.
     """
-    diagnosed, held_out = measured(context)
+    diagnosed, held_out = measured(context, rig)
     folder = context.settings.out / "measured"
     digest = hashlib.sha256(diagnosed.times_us.tobytes() + held_out.times_us.tobytes() + NOMINAL.encode()).hexdigest()[:16]
     path = folder / f"ladder-{digest}.json"
@@ -77,17 +105,21 @@ def climb(context: Context) -> list[Rung]:
 
 
 def models(report: touchstone.Report) -> list[tuple[str, str]]:
-    """(name, model file) of each rung of a report of NOMINAL."""
+    """(name, model file) of each rung of a report of NOMINAL, terms in the order of the saved file: the last rung but a
+    suggestion is that file itself, what `diagnose --save-model` writes; a suggestion what it writes --with-formula."""
     found = [("nominal", NOMINAL)]
-    head, blocks = _blocks(report.improved_model or NOMINAL)
-    named = {step.effect for step in report.steps}
-    # Refitted values of effects that the nominal model has already are part of every rung but the first.
-    kept = [block for block in blocks if _effect(block) not in named]
-    for step in report.steps:
-        kept += [block for block in blocks if _effect(block) == step.effect]
-        found.append((f"+ {step.effect}", head + "".join(kept)))
+    if report.improved_model:
+        head, blocks = _blocks(report.improved_model)
+        named = [step.effect for step in report.steps]
+        for count, name in enumerate(named, 1):
+            # Refitted values of effects that the nominal model has already are part of every rung but the first.
+            later = set(named[count:]) - set(named[:count])
+            model = head + "".join(block for block in blocks if _effect(block) not in later)
+            if model != found[-1][1]:
+                found.append((f"+ {name}", model))
+        if found[-1][1] != report.improved_model:
+            found.append(("+ refitted values", report.improved_model))
     if report.suggested_model:
-        # What `diagnose --save-model --with-formula` writes: in its place, with every value fitted beside it.
         found.append(("+ suggestion", report.suggested_model))
     return found
 

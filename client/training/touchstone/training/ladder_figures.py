@@ -9,37 +9,44 @@ import numpy as np
 
 from . import figures, plans
 from .context import Context
-from .ladder import Rung
+from .ladder_words import Climb, verdict
 from .result import Estimate, Figure
 
 
-def draw_ladder(context: Context, rungs: Sequence[Rung], shown: Mapping[str, Sequence[Estimate | None]],
-                alone: Mapping[str, tuple[float, Estimate]]) -> Figure:
-    """Accuracy at each rung, `shown` on the "rig" and "simulated"; and of single effects (RMSE in us, accuracy lost)."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4), width_ratios=[1.25, 1])
-    x = np.arange(len(rungs))
-    for key, name, look in (("rig", context.settings.measured_kind, "emulated"), ("simulated", "its own simulation", "virtual")):
-        points = shown[key]
-        left.errorbar(x, [100 * p.value for p in points], [[100 * (p.value - p.low) for p in points], [100 * (p.high - p.value) for p in points]],
-                      marker="o" if key == "rig" else "s", color=figures.colour(look), label=name, capsize=2)
-    left.axhline(100 / len(plans.OBJECTS), color="#7b8794", linestyle=":", linewidth=1)
-    left.annotate("chance", (1, 100 / len(plans.OBJECTS)), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#7b8794")
-    left.set(ylabel="accuracy, %", ylim=(0, 100), title="Each step of the ladder")
-    left.set_xticks(x, [f"{r.name}\n{r.rmse_us / 1e3:.1f} ms" for r in rungs], rotation=25, ha="right", fontsize=8)
-    left.legend(loc="lower right")
+def draw_ladder(context: Context, climbs: Sequence[Climb], alone: Mapping[str, tuple[float, Estimate]]) -> Figure:
+    """Accuracy at each rung of each rig; and of single effects (RMSE in us, accuracy lost)."""
+    figure, all_axes = plt.subplots(1, len(climbs) + 1, figsize=(3.5 * (len(climbs) + 1), 4.2))
+    kind = context.settings.measured_kind
+    for axes, climb in zip(all_axes, climbs):
+        x = np.arange(len(climb.rungs))
+        for key, name, look in (("rig", kind, "emulated"), ("simulated", "its own simulation", "virtual")):
+            shown = climb.shown(key)
+            axes.errorbar(x, [100 * p.value for p in shown], [[100 * (p.value - p.low) for p in shown], [100 * (p.high - p.value) for p in shown]],
+                          marker="o" if key == "rig" else "s", color=figures.colour(look), label=name, capsize=2)
+        for k in range(1, len(climb.rungs)):
+            if verdict(climb.step(k)) == "loses":
+                axes.annotate("harms", (k, 100 * climb.shown("rig")[k].value), xytext=(0, -16), textcoords="offset points", ha="center", fontsize=8)
+        axes.axhline(100 / len(plans.OBJECTS), color="#7b8794", linestyle=":", linewidth=1)
+        axes.annotate("chance", (1, 100 / len(plans.OBJECTS)), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8,
+                      color="#7b8794")
+        axes.set(ylim=(0, 100), title=f"{climb.hidden.name}: {100 * climb.gain().value:+.1f} points")
+        axes.set_xticks(x, [f"{r.name}\n{r.rmse_us / 1e3:.1f} ms" for r in climb.rungs], rotation=25, ha="right", fontsize=8)
+    all_axes[0].set_ylabel("accuracy, %")
+    all_axes[0].legend(loc="lower right", fontsize=8)
+    right = all_axes[-1]
     for place, (name, (rmse, loss)) in enumerate(alone.items()):
         right.errorbar([rmse / 1e3], [100 * loss.value], [[100 * (loss.value - loss.low)], [100 * (loss.high - loss.value)]],
                        marker="osD^"[place], color=figures.colour(name, place), capsize=2, linestyle="", label=name)
     right.axhline(0, color="#7b8794", linewidth=1)
     right.set(xlabel="RMSE, ms", ylabel="accuracy lost, points", title="One effect alone, simulated", xlim=(0, None))
     right.legend(loc="best", fontsize=8)
-    return figures.save(figure, context.figure_path("ladder"), "Left: accuracy of recognisers trained by each model, with the model's "
-                        "RMSE below it. Right: what single effects cost that the model lacks. Bars: 95 % over seeds.")
+    return figures.save(figure, context.figure_path("ladder"), "Accuracy of recognisers trained by each model of three ladders, with the "
+                        "model's RMSE below it. Right: what single effects cost that the model lacks. Bars: 95 % over seeds.")
 
 
-def draw_worth(context: Context, rungs: Sequence[Rung], worth: Mapping[str, Sequence[Mapping]],
-               ranks: Sequence[Estimate | None]) -> Figure:
+def draw_worth(context: Context, climb: Climb, worth: Mapping[str, Sequence[Mapping]]) -> Figure:
     """What simulated touches save at each rung, {quantity: [{"gain": (value, low, high)}]}, and rank correlations."""
+    rungs, ranks = climb.rungs, climb.ranks()
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.6))
     x = np.arange(len(rungs))
     for shift, (quantity, each) in zip((-0.08, 0.08), worth.items()):
@@ -52,9 +59,10 @@ def draw_worth(context: Context, rungs: Sequence[Rung], worth: Mapping[str, Sequ
     left.yaxis.set_major_formatter(plt.FormatStrFormatter("%g"))
     left.yaxis.set_minor_formatter(plt.NullFormatter())
     left.legend(loc="upper left")
-    known = [k for k, rank in enumerate(ranks) if rank is not None]
-    right.errorbar(known, [ranks[k].value for k in known], [[ranks[k].value - ranks[k].low for k in known],
-                   [ranks[k].high - ranks[k].value for k in known]], marker="o", linestyle="", capsize=2, color=figures.colour("both"))
+    known = [(k, rank) for k, rank in enumerate(ranks) if rank is not None]
+    right.errorbar([k for k, _ in known], [rank.value for _, rank in known],
+                   [[rank.value - rank.low for _, rank in known], [rank.high - rank.value for _, rank in known]],
+                   marker="o", linestyle="", capsize=2, color=figures.colour("both"))
     right.axhline(0, color="#7b8794", linewidth=1)
     right.set(ylabel="Spearman's rank correlation", title="Ten recognisers, simulated and tested", ylim=(-1.05, 1.05))
     for axes in (left, right):

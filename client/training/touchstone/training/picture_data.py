@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 import pathlib
 import time
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -22,37 +22,35 @@ import touchstone
 from . import plans
 from .backbone import Backbone
 from .context import Context
+from .features import FeatureSets
+from .separation import command_numbers, pose_seed
 from .settings import SUPERSHAPES
 
 STANDOFF_MM, DISTANCE_MM, RADIUS_MM = 150.0, 250.0, 310.0
 SIDE_PX = 224
-VIRTUAL = touchstone.sphere(step_angle_deg=1, roll_step_deg=1, radius_ratio=2.4)
-# Seeds of poses: of what the rig photographs, and far from it of what is simulated.
-_RIG_SEED, _VIRTUAL_SEED = 7, 1_000_000
+# The seed's steps of a degree would have a view come again now and then, in training and in a test.
+VIRTUAL = touchstone.sphere(step_angle_deg=0.1, roll_step_deg=0.1, radius_ratio=2.4)
 
 
 @dataclasses.dataclass
 class Pictures:
     """Attributes:
       image: (N, height, width, 1) uint8.
-      object: (N,) index into SUPERSHAPES.
+      object: (N,) index into the objects.
       kind: where they are from, for made_on.
+      poses: (N,) a number for the commanded pose of the camera; copies of a picture have its number.
     """
 
     image: np.ndarray
     object: np.ndarray
     kind: str
+    poses: np.ndarray
 
     def __len__(self) -> int:
         return len(self.object)
 
     def __getitem__(self, rows) -> Pictures:
-        return Pictures(self.image[rows], self.object[rows], self.kind)
-
-
-def joined(*parts: Pictures) -> Pictures:
-    return Pictures(np.concatenate([p.image for p in parts]), np.concatenate([p.object for p in parts]),
-                    " + ".join(p.kind for p in parts))
+        return Pictures(self.image[rows], self.object[rows], self.kind, self.poses[rows])
 
 
 def rig_poses(per_face: int, seed: int) -> touchstone.Touches:
@@ -68,50 +66,56 @@ def virtual_poses(client: touchstone.Client, name: str, count: int, seed: int) -
     return dataclasses.replace(found, standoff_mm=np.full(count, RADIUS_MM))
 
 
-def virtual(context: Context, per_object: int, seed: int, normalize: bool = False) -> Pictures:
-    """Simulated ones of all objects from random directions, without noise; other poses for every seed."""
-    client = context.simulator
+def _pose_numbers(name: str, views: touchstone.Touches) -> np.ndarray:
+    return command_numbers((name,), np.zeros(len(views), int), views.target_mm, views.approach, views.lateral)
+
+
+def photographed(client: touchstone.Client, objects: Sequence[str], per_object: int, seed: int, *, model: str = plans.IDEAL,
+                 normalize: bool = True) -> Pictures:
+    """By a simulator, of all objects, from random directions; `seed`: of separation.pose_seed()."""
     image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
-    found = [client.capture(name, virtual_poses(client, name, per_object, _VIRTUAL_SEED + seed), image=image,
-                            model=plans.IDEAL)["image"] for name in SUPERSHAPES]
-    return Pictures(np.concatenate(found), np.repeat(np.arange(len(SUPERSHAPES)), per_object), "virtual")
+    views = {name: virtual_poses(client, name, per_object, seed) for name in objects}
+    found = [client.capture(name, each, image=image, model=model)["image"] for name, each in views.items()]
+    return Pictures(np.concatenate(found), np.repeat(np.arange(len(objects)), per_object), "virtual",
+                    np.concatenate([_pose_numbers(*each) for each in views.items()]))
 
 
-def measured(context: Context, per_object: int, normalize: bool = False) -> Pictures:
+def virtual(context: Context, per_object: int, seed: int, *, use: str = "training", normalize: bool = True) -> Pictures:
+    """Simulated ones of the supershapes without noise; other poses for every seed and use. `normalize`: dark objects on white,
+    as the seed prepared its pictures."""
+    return photographed(context.simulator, SUPERSHAPES, per_object, pose_seed(use, "pictures", seed), normalize=normalize)
+
+
+def measured(context: Context, per_object: int, normalize: bool = True) -> Pictures:
     """By the rig's camera. Kept in the folder of the run: an arm takes its time."""
-    settings = context.settings
-    words = json.dumps([per_object, normalize, settings.rig, plans.RIG, "blind", DISTANCE_MM, SIDE_PX])
-    path = settings.out / "measured" / f"pictures-{hashlib.sha256(words.encode()).hexdigest()[:16]}.npz"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part.npz")
-        np.savez_compressed(part, image=_photograph(context, per_object, normalize))
-        context.stop_rigs()
-        part.replace(path)
-    with np.load(path) as found:
-        return Pictures(found["image"], np.repeat(np.arange(len(SUPERSHAPES)), per_object), settings.measured_kind)
+    found = context.kept([per_object, normalize, list(plans.RIG), "pictures", DISTANCE_MM, SIDE_PX],
+                         lambda: _photograph(context, per_object, normalize))
+    return Pictures(found["image"], np.repeat(np.arange(len(SUPERSHAPES)), per_object), context.settings.measured_kind, found["poses"])
 
 
 def _photograph(context, per_object, normalize):
     """The first `per_object` poses of each object that the arm reaches, one at a time."""
-    client, found = context.rig(*plans.RIG), []
+    client, images, poses = context.rig(*plans.RIG), [], []
     total = per_object * len(SUPERSHAPES)
     image = touchstone.image(SIDE_PX, SIDE_PX, normalize=normalize)
-    for k, name in enumerate(SUPERSHAPES):
-        views, taken = rig_poses(per_object // 3 + 2, _RIG_SEED + k), 0
+    for name in SUPERSHAPES:
+        views, taken = rig_poses(per_object // 3 + 2, pose_seed("rig", "pictures", name)), 0
+        numbers = _pose_numbers(name, views)
         for view in range(len(views)):
             if taken == per_object:
                 break
-            if len(found) % 25 == 0:
-                context.progress(0, f"photographed {len(found)} of {total} times with the rig")
+            if len(images) % 25 == 0:
+                context.progress(0, f"photographed {len(images)} of {total} times with the rig")
             try:
-                found.append(client.capture(name, views[view], image=image)["image"])
+                images.append(client.capture(name, views[view], image=image)["image"])
+                poses.append(numbers[view])
                 taken += 1
             except touchstone.InvalidRequest:
                 continue  # out of reach; the next pose is another one
         if taken < per_object:
             raise touchstone.SourceFailed(f"the arm reaches {taken} of {len(views)} poses of {name}; {per_object} are needed")
-    return np.concatenate(found)
+    context.stop_rigs()
+    return {"image": np.concatenate(images), "poses": np.array(poses)}
 
 
 def split(pictures: Pictures, test: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +138,7 @@ def scaled(pictures: Pictures, copies: int, rng: np.random.Generator, reach: tup
             matrix = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), 0, factor)
             found.append(cv2.warpAffine(picture, matrix, (width, height), flags=cv2.INTER_LINEAR,
                                         borderMode=cv2.BORDER_REPLICATE)[:, :, None])
-    return Pictures(np.array(found), np.repeat(pictures.object, copies), pictures.kind)
+    return Pictures(np.array(found), np.repeat(pictures.object, copies), pictures.kind, np.repeat(pictures.poses, copies))
 
 
 def binarised(pictures: Pictures) -> Pictures:
@@ -161,7 +165,11 @@ class FeatureCache:
         self._folder: pathlib.Path = context.settings.out / "features"
         self.pictures, self.seconds = 0, 0.0
 
-    def __call__(self, pictures: Pictures) -> np.ndarray:
+    def __call__(self, pictures: Pictures) -> FeatureSets:
+        """Their features, objects and poses."""
+        return FeatureSets(self._features(pictures), pictures.object, pictures.poses)
+
+    def _features(self, pictures: Pictures) -> np.ndarray:
         """(N, F) float32."""
         image = np.ascontiguousarray(pictures.image)
         name = hashlib.sha256(self.backbone.digest.encode() + repr(image.shape).encode() + image.tobytes()).hexdigest()[:24]

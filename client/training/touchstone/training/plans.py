@@ -37,5 +37,11 @@ RIG = ("--sigma-us", f"{SIGMA_US:.0f}", "--hide", "tip_radius.radius_mm=2", "--h
 
 
 def measured(settings: Settings) -> Any:
-    """The seed's protocol on the rig: rounds x samples a face x 6 faces; 192 touches an object in a whole run."""
+    """What the rig measures: the six faces of each object, 192 touches an object in a whole run. The seed measures in rounds;
+    here each pose is touched once, so that as many poses as can be are trained on and tested."""
+    return touchstone.faces(samples_per_face=settings.pick(8, 32), rounds=1)
+
+
+def measured_in_rounds(settings: Settings) -> Any:
+    """As many touches by the seed's protocol, rounds x samples a face x 6 faces: every pose in each round."""
     return touchstone.faces(samples_per_face=settings.pick(4, 8), rounds=settings.pick(2, 4))

@@ -8,6 +8,9 @@ import numpy as np
 import xgboost
 from sklearn import discriminant_analysis, ensemble, linear_model, naive_bayes, neighbors, neural_network, pipeline, preprocessing, svm
 
+from .features import FeatureSets, joined
+from .separation import check
+
 
 def _scaled(recogniser: Any) -> Any:
     return pipeline.make_pipeline(preprocessing.StandardScaler(), recogniser)
@@ -33,11 +36,40 @@ TEN: dict[str, Callable[[int], Any]] = {
 }
 
 
-def accuracy(recogniser: Any, train: tuple[np.ndarray, np.ndarray], test: tuple[np.ndarray, np.ndarray]) -> float:
-    """Share of the test sets that it recognises after it was trained."""
-    return float(np.mean(recogniser.fit(*train).predict(test[0]) == test[1]))
+class Trained:
+    """A recogniser that was trained on feature sets, and is asked about none of their poses (Leak)."""
+
+    def __init__(self, recogniser: Any, *train: FeatureSets, check_poses: bool = True):
+        """`recogniser`: a new one. `check_poses` False: where a leak is what is shown."""
+        sets = joined(*train)
+        self._recogniser = recogniser.fit(sets.values, sets.objects)
+        self._poses = np.unique(sets.poses) if check_poses else np.empty(0, np.int64)
+
+    def predict(self, sets: FeatureSets) -> np.ndarray:
+        """(M,) objects."""
+        check(self._poses, sets.poses)
+        return self._recogniser.predict(sets.values)
+
+    def probabilities(self, sets: FeatureSets) -> np.ndarray:
+        """(M, classes)."""
+        check(self._poses, sets.poses)
+        return self._recogniser.predict_proba(sets.values).astype(float)
+
+    def accuracy(self, sets: FeatureSets) -> float:
+        """Share of the sets that it recognises."""
+        return float(np.mean(self.predict(sets) == sets.objects))
 
 
-def confusion(recogniser: Any, test: tuple[np.ndarray, np.ndarray], classes: int) -> np.ndarray:
-    """(true, recognised) counts of a trained one."""
-    return np.bincount(test[1] * classes + recogniser.predict(test[0]), minlength=classes**2).reshape(classes, classes)
+def accuracy(recogniser: Any, train: FeatureSets, test: FeatureSets) -> float:
+    """Of a new recogniser after it was trained."""
+    return Trained(recogniser, train).accuracy(test)
+
+
+def confusion(recogniser: Trained, test: FeatureSets, classes: int) -> np.ndarray:
+    """(true, recognised) counts."""
+    return np.bincount(test.objects * classes + recogniser.predict(test), minlength=classes**2).reshape(classes, classes)
+
+
+def shuffled(train: FeatureSets, rng: np.random.Generator) -> FeatureSets:
+    """The same sets with their objects exchanged at random: whoever learns from them can know nothing."""
+    return FeatureSets(train.values, rng.permutation(train.objects), train.poses)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import pathlib
 from collections.abc import Sequence
 from typing import Any
@@ -10,6 +11,15 @@ from typing import Any
 import numpy as np
 
 import touchstone
+
+from .separation import command_numbers
+
+
+def curvature_per_m(times_us: np.ndarray, speed_mm_s: float, spacing_mm: float) -> np.ndarray:
+    """(N,) local curvature in 1/m of (N, 3) contact times, positive where the surface is convex:
+    speed (t_l - 2 t_m + t_r) / spacing^2."""
+    left, middle, right = times_us.T / 1e6
+    return speed_mm_s * (left - 2 * middle + right) / spacing_mm**2 * 1e3
 
 
 @dataclasses.dataclass
@@ -42,9 +52,16 @@ class TouchData:
         return dataclasses.replace(self, image=None if self.image is None else self.image[rows], **picked)
 
     def curvature(self) -> np.ndarray:
-        """Local curvature in 1/m of each touch, positive where the surface is convex: speed (t_l - 2 t_m + t_r) / spacing^2."""
-        left, middle, right = self.times_us.T / 1e6
-        return self.speed_mm_s * (left - 2 * middle + right) / self.spacing_mm**2 * 1e3
+        """Local curvature in 1/m of each touch."""
+        return curvature_per_m(self.times_us, self.speed_mm_s, self.spacing_mm)
+
+    def poses(self) -> np.ndarray:
+        """(N,) a number for each commanded pose of each object; rounds of one pose have the same, from every source."""
+        return self._poses
+
+    @functools.cached_property
+    def _poses(self) -> np.ndarray:
+        return command_numbers(self.objects, self.object, self.target_mm, self.approach, self.lateral)
 
     def save(self, path: pathlib.Path) -> None:
         """Whole or not at all."""

@@ -9,8 +9,8 @@ from .. import figures, ladder, plans
 from ..calibration import Novelty, conformal_sets, conformal_threshold, expected_calibration_error, reliability
 from ..context import Context
 from ..experiment import Experiment
-from ..features import feature_sets
-from ..recognisers import TEN
+from ..features import dealt_sets
+from ..recognisers import TEN, Trained
 from ..result import Result, Table
 from ..statistics import estimate, estimate_share
 
@@ -33,28 +33,29 @@ def run(context: Context) -> Result:
     return _result(context, rungs, rig, found)
 
 
-def _simulated(context, model, seed, sets, touches):
-    data = context.simulated(sets * touches * len(plans.OBJECTS), model=model, seed=seed)
-    return feature_sets(data, touches, np.random.default_rng(seed))
+def _simulated(context, model, seed, sets, touches, use):
+    data = context.simulated(sets * touches * len(plans.OBJECTS), model=model, seed=seed, use=use)
+    return dealt_sets(data, touches, np.random.default_rng(seed))
 
 
 def _seed(context, model, seed, rig):
     """Everything of one seed and one model: {"ece", "curves", "conformal", "novel"}."""
     sets = context.settings.pick(40, 300)
-    train, calibrate, test = (_simulated(context, model, base + seed, sets, TOUCHES) for base in (1000, 2000, 3000))
-    x, y = feature_sets(rig, TOUCHES, context.rng("deal", seed))
+    train, calibrate, test = (_simulated(context, model, seed, sets, TOUCHES, use) for use in ("training", "calibration", "testing"))
+    measured = dealt_sets(rig, TOUCHES, context.rng("deal", seed))
+    y = measured.objects
     first = context.rng("halves", seed).permutation(len(y)) < len(y) // 2
     shown = {"ece": {}, "curves": {}, "conformal": {}, "novel": _novel(context, model, seed, rig)}
     for name in RECOGNISERS:
-        recogniser = TEN[name](seed).fit(*train)
-        told = recogniser.predict_proba
-        shown["ece"][name] = {"simulated": expected_calibration_error(told(test[0]), test[1]),
-                              "rig": expected_calibration_error(told(x), y)}
-        shown["curves"][name] = {"simulated": reliability(told(test[0]), test[1]).tolist(), "rig": reliability(told(x), y).tolist()}
+        told = Trained(TEN[name](seed), train).probabilities
+        by_rig, by_test = told(measured), told(test)
+        shown["ece"][name] = {"simulated": expected_calibration_error(by_test, test.objects), "rig": expected_calibration_error(by_rig, y)}
+        shown["curves"][name] = {"simulated": reliability(by_test, test.objects).tolist(), "rig": reliability(by_rig, y).tolist()}
         if name == RECOGNISERS[0]:
-            cases = {"simulated, by simulated": (told(test[0]), test[1], told(calibrate[0]), calibrate[1]),
-                     "rig, by simulated": (told(x[~first]), y[~first], told(calibrate[0]), calibrate[1]),
-                     "rig, by rig": (told(x[~first]), y[~first], told(x[first]), y[first])}
+            by_calibration = told(calibrate)
+            cases = {"simulated, by simulated": (by_test, test.objects, by_calibration, calibrate.objects),
+                     "rig, by simulated": (by_rig[~first], y[~first], by_calibration, calibrate.objects),
+                     "rig, by rig": (by_rig[~first], y[~first], by_rig[first], y[first])}
             for case, (given, true, other, other_true) in cases.items():
                 answer = conformal_sets(given, other, other_true, COVERAGE)
                 shown["conformal"][case] = (float(answer[np.arange(len(true)), true].mean()), float(answer.sum(1).mean()))
@@ -64,8 +65,10 @@ def _seed(context, model, seed, rig):
 def _novel(context, model, seed, rig):
     """{object left out: {"simulated" | "rig by simulated" | "rig by rig": (found, false alarms)}}."""
     sets = context.settings.pick(25, 150)
-    train, calibrate, test = (_simulated(context, model, base + seed, sets, NOVEL_TOUCHES) for base in (4000, 5000, 6000))
-    x, y = feature_sets(rig, NOVEL_TOUCHES, context.rng("novel", seed))
+    train, calibrate, test = ((each.values, each.objects) for each in (
+        _simulated(context, model, seed, sets, NOVEL_TOUCHES, f"novel {use}") for use in ("training", "calibration", "testing")))
+    measured = dealt_sets(rig, NOVEL_TOUCHES, context.rng("novel", seed))
+    x, y = measured.values, measured.objects
     first = context.rng("novel halves", seed).permutation(len(y)) < len(y) // 2
     found = {}
     for left_out, name in enumerate(plans.OBJECTS):

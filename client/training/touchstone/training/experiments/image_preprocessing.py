@@ -11,7 +11,7 @@ from ..experiment import Experiment
 from ..picture_data import SUPERSHAPES, FeatureCache, Pictures, binarised, inverted, measured, virtual
 from ..result import Result, Table
 from ..statistics import estimate_share
-from .image_recognition import CLASSES
+from .image_recognition import CLASSES, sizes
 
 KINDS = ("as it is", "binarised", "inverted", "normalised")
 
@@ -23,20 +23,19 @@ def variants(plain: Pictures, normalised: Pictures) -> dict[str, Pictures]:
 
 def run(context: Context) -> Result:
     settings, cache = context.settings, FeatureCache(context)
-    per_object, test_per_object = settings.pick((8, 5), (60, 15))
-    pool_per_object = settings.pick(15, 75)
-    pool = measured(context, pool_per_object)
-    # The first poses of the pool are those of the normalised pictures.
-    plain = pool[np.flatnonzero(np.arange(len(pool)) % pool_per_object < test_per_object)]
-    test = variants(plain, measured(context, test_per_object, normalize=True))
+    per_object, test_per_object = settings.pick((8, 5), (30, 15))
+    # The first poses of the pool of other experiments are those of the pictures as they are.
+    pool, pool_per_object = measured(context, sizes(context).measured_per_object), sizes(context).measured_per_object
+    normalised = pool[np.flatnonzero(np.arange(len(pool)) % pool_per_object < test_per_object)]
+    test = variants(measured(context, test_per_object, normalize=False), normalised)
     test_features = {name: cache(pictures) for name, pictures in test.items()}
     accuracies, train = {name: [] for name in KINDS}, None
     for step, seed in enumerate(settings.runs):
         context.progress(step / settings.seeds, f"seed {seed}")
-        train = variants(virtual(context, per_object, seed), virtual(context, per_object, seed, normalize=True))
+        train = variants(virtual(context, per_object, seed, normalize=False), virtual(context, per_object, seed))
         for name, pictures in train.items():
-            head = image_head.train(cache(pictures), pictures.object, CLASSES, seed, epochs=settings.pick(12, image_head.EPOCHS))
-            accuracies[name].append(head.accuracy(test_features[name], test[name].object))
+            head = image_head.train(cache(pictures), CLASSES, seed, epochs=settings.pick(12, image_head.EPOCHS))
+            accuracies[name].append(head.accuracy(test_features[name]))
     return _result(context, cache, accuracies, train, test, per_object, test_per_object)
 
 

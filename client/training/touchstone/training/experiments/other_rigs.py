@@ -13,12 +13,13 @@ import numpy as np
 
 import touchstone
 
-from .. import figures, plans
+from .. import controls, figures, plans
 from ..context import Context
 from ..experiment import Experiment
-from ..features import BINS
-from ..recognisers import SEEDS
+from ..features import FeatureSets
+from ..recognisers import SEEDS, Trained, accuracy, shuffled
 from ..result import Result, Table
+from ..separation import pose_numbers, pose_seed
 from ..statistics import estimate_share
 
 SIGMA_US = 5000.0
@@ -85,7 +86,8 @@ def _columns(client, touches, seed, model=None):
 
 def _measured(context, rig):
     per_face = context.settings.pick(3, 16)
-    return context.kept([rig.options, "blind", per_face, STROKE_MM], lambda: _columns(context.rig(*rig.options), lines(per_face, 31), 31))
+    return context.kept([rig.options, "lines", per_face, STROKE_MM], lambda: _columns(
+        context.rig(*rig.options), lines(per_face, pose_seed("rig", "lines")), 31))
 
 
 def seen(times_us: np.ndarray, spacing_mm: float) -> tuple[np.ndarray, float, str]:
@@ -103,25 +105,27 @@ def seen(times_us: np.ndarray, spacing_mm: float) -> tuple[np.ndarray, float, st
     return travel_mm - STANDOFF_MM, 40.0, "depth, mm"
 
 
-def _sets(data, spacing_mm, rng):
-    """(M, BINS) histograms and (M,) objects of sets of TOUCHES touches."""
+def _sets(data, spacing_mm, rng) -> FeatureSets:
+    """Sets of TOUCHES touches: what all neighbouring fingers of all of them tell, from the smallest to the largest."""
     values, reach, _ = seen(data["contact_time_us"], spacing_mm)
     groups = [rng.permutation(np.flatnonzero(data["object"] == k)) for k in range(len(plans.OBJECTS))]
     rows = np.concatenate([each[: len(each) // TOUCHES * TOUCHES].reshape(-1, TOUCHES) for each in groups])
-    pooled = values[rows].reshape(len(rows), -1)
-    places = np.clip(np.floor((pooled + reach) / (2 * reach) * BINS), 0, BINS - 1)
-    return (places[:, :, None] == np.arange(BINS)).mean(1), data["object"][rows[:, 0]].astype(int)
+    index = data["object"].astype(int)
+    # The lines are the same for all objects: it is the line that must not be trained on, whatever lay there.
+    poses = pose_numbers(np.column_stack([data["target_mm"], data["approach"], data["lateral"]]))
+    return FeatureSets(np.sort(values[rows].reshape(len(rows), -1), 1) / reach, index[rows[:, 0]], poses[rows])
 
 
 def _seed(context, rig, measured, seed):
-    """Accuracy (on its own simulation, on the rig's touches, on those with shuffled labels in training)."""
-    per_face = -(-context.settings.pick(40, 120) * TOUCHES // 6)
-    train, test = (_sets(_columns(context.simulator, lines(per_face, base + seed), base + seed, rig.model), rig.spacing_mm,
-                         np.random.default_rng(seed)) for base in (1000, 2000))
-    x, y = _sets(measured, rig.spacing_mm, context.rng("deal", seed))
-    recogniser = SEEDS["XGBoost"](seed).fit(*train)
-    shuffled = SEEDS["XGBoost"](seed).fit(train[0], context.rng("shuffled", seed).permutation(train[1]))
-    return [float(np.mean(r.predict(a) == b)) for r, (a, b) in ((recogniser, test), (recogniser, (x, y)), (shuffled, test))]
+    """(accuracy on its own simulation, on the rig's touches, [with shuffled labels in training, on its own simulation])."""
+    settings = context.settings
+    per_face = -(-settings.pick(40, 120) * TOUCHES // 6)
+    train, test = (_sets(_columns(context.simulator, lines(per_face, pose_seed(use, "lines", seed)), pose_seed(use, "noise", seed), rig.model),
+                         rig.spacing_mm, np.random.default_rng(seed)) for use in ("training", "testing"))
+    recogniser = Trained(SEEDS["XGBoost"](seed), train)
+    told = context.rng("shuffled", rig.name, seed)
+    return (recogniser.accuracy(test), recogniser.accuracy(_sets(measured, rig.spacing_mm, context.rng("deal", seed))),
+            [accuracy(SEEDS["XGBoost"](seed), shuffled(train, told), test) for _ in range(settings.pick(3, 20))])
 
 
 def _diagnosed(context, rig, measured):
@@ -145,7 +149,7 @@ def _diagnosed(context, rig, measured):
 
 def _result(context, rigs, found):
     kind = context.settings.measured_kind
-    asked = len(lines(context.settings.pick(3, 16), 31)) * len(plans.OBJECTS)
+    asked = len(lines(context.settings.pick(3, 16), 1)) * len(plans.OBJECTS)
     missed = 1 - np.mean([each["touches"] for each in found.values()]) / asked
     result = Result("", "", made_on=[
         (f"each rig: {min(f['touches'] for f in found.values())} to {max(f['touches'] for f in found.values())} {kind} touches of "
@@ -155,9 +159,10 @@ def _result(context, rigs, found):
          f"({missed:.0%} of the {kind} ones)"),
         "intervals are over the simulated touches, the dealing into sets and the training of each seed"])
     chance = 1 / len(plans.OBJECTS)
-    above, rows = [], []
+    above, rows, checks = [], [], {}
     for rig in rigs:
-        inside, outside, shuffled = (estimate_share(column) for column in np.transpose(found[rig.name]["accuracy"]))
+        inside, outside = (estimate_share([each[k] for each in found[rig.name]["accuracy"]]) for k in (0, 1))
+        checks[rig.name] = controls.control([each[2] for each in found[rig.name]["accuracy"]], chance)
         if outside.low > chance:
             above.append(rig.name)
         said = found[rig.name]["diagnosis"]
@@ -165,10 +170,10 @@ def _result(context, rigs, found):
                      + ("; ".join(" or ".join(names) for names in said["effects"]) or "no effect"))
         rmse = "" if "refused" in said else f"{said['rmse_us'] / 1e3:.1f}, then {said['final_rmse_us'] / 1e3:.1f}"
         what = seen(np.zeros((1, rig.fingers)), rig.spacing_mm)[2]
-        rows.append([rig.name, what, inside.words(), outside.words(), shuffled.words(), rmse, diagnosis])
+        rows.append([rig.name, what, inside.words(), outside.words(), checks[rig.name].found.words(), rmse, diagnosis])
     result.words = [
         f"{len(above)} of {len(rigs)} other hands, sensors and arms recognise the objects better than chance on {kind} touches, by the same "
-        f"command" + (f": {'; '.join(above)}." if above else "."), _finger_words(rigs, found)]
+        f"command" + (f": {'; '.join(above)}." if above else "."), _finger_words(rigs, found), _control_words(checks)]
     result.tables = [Table("Rigs", ["rig", "feature", "accuracy, own simulation", f"accuracy, {kind}", "labels shuffled", "RMSE before and after, ms",
                                     "diagnosis of the nominal model"], rows,
                      "One finger's times have no differences: how deep it goes behind the face of a box about all objects takes their place, "
@@ -178,11 +183,19 @@ def _result(context, rigs, found):
     return result
 
 
+def _control_words(checks) -> str:
+    odd = [name for name, each in checks.items() if not each.is_chance]
+    low, high = min(each.found.value for each in checks.values()), max(each.found.value for each in checks.values())
+    shuffles = next(iter(checks.values())).shuffles
+    return (f"With shuffled labels ({shuffles} shuffles a rig) {low:.1%} to {high:.1%} are recognised, chance is 20%: "
+            + (f"not what chance gives for {', '.join(odd)}." if odd else "what chance gives, for every rig."))
+
+
 def _finger_words(rigs, found):
     first = next((rig for rig in rigs if rig.fingers == 1), None)
     if first is None:
         return "No rig of one finger was tried."
-    outside = estimate_share(np.array(found[first.name]["accuracy"])[:, 1])
+    outside = estimate_share([each[1] for each in found[first.name]["accuracy"]])
     if outside.low > 1 / len(plans.OBJECTS):
         return (f"One finger has no descriptor, but how deep it goes behind the face of a box about all objects tells them apart in "
                 f"{outside.words()} of the sets. Known is where and how the object lies, not which it is: the lines are the same for all. "
@@ -195,7 +208,7 @@ def _draw(context, rigs, found, kind):
     figure, axes = plt.subplots(figsize=(7, 0.55 * len(rigs) + 1.4))
     y = np.arange(len(rigs))[::-1]
     for column, name, look, shift in ((0, "its own simulation", "virtual", 0.12), (1, kind, "emulated", -0.12)):
-        points = [estimate_share(np.array(found[rig.name]["accuracy"])[:, column]) for rig in rigs]
+        points = [estimate_share([each[column] for each in found[rig.name]["accuracy"]]) for rig in rigs]
         axes.errorbar([100 * p.value for p in points], y + shift, xerr=[[100 * (p.value - p.low) for p in points],
                       [100 * (p.high - p.value) for p in points]], marker="s" if column == 0 else "o", linestyle="", capsize=2,
                       color=figures.colour(look), label=name)

@@ -20,7 +20,7 @@ STROKE_MM = 100.0
 NOISES = (1, 2, 4)  # times the seed's, on simulated touches
 POLICIES = ("information", "random", "fixed")
 # The rig of the ladder with the seed's noise: with an optical sensor's one touch is enough, whichever it is.
-RIG = ("--sigma-us", f"{plans.SIGMA_US:.0f}", *ladder.HIDDEN)
+RIG = ("--sigma-us", f"{plans.SIGMA_US:.0f}", *ladder.RIGS[0].hidden)
 
 
 def run(context: Context) -> Result:
