@@ -416,7 +416,8 @@ absl::Status Comparison::SendAhead() {
 
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
   if (!options.html.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.html, client::HtmlReport(report)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string page, client::HtmlReport(report));
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.html, page));
     cli.LogWritten(options.html);
   }
   if (options.json.empty()) return absl::OkStatus();
