@@ -1,6 +1,7 @@
 // What is selected, shared by all views. The URL's hash holds it, so that a link shows the same.
 import { computed, effect, signal } from "@preact/signals";
 import type { PageData, Report } from "./data/report";
+import { colourLimit } from "./charts/scale";
 import { Touches } from "./data/touches";
 
 export const page = signal<PageData | null>(null);
@@ -15,7 +16,7 @@ export const object = signal<string | null>(null);
 export const finger = signal<number | null>(null);
 export const touch = signal<number | null>(null); // its number in the file
 export const picture = signal<string | null>(null);
-export const covariate = signal<string>("");
+export const covariate = signal<string>(""); // "": the one that the residual depends on most
 export const step = signal<number | null>(null); // of the ladder
 
 export const hasImproved = computed(() => !!page.value?.report.improved_model_yaml);
@@ -26,19 +27,26 @@ export const touchEntries = computed(() =>
 export const entry = computed(() => touchEntries.value.find(({ index }) => index === session.value) ?? touchEntries.value[0]);
 export const touches = computed(() => (entry.value ? new Touches(entry.value.data) : null));
 
+// Half the width of the colours' scale: of the given model, so that colours before and after mean the same.
+export const limit = computed(() => (touches.value ? colourLimit(touches.value.residual) : 1));
+
 // 1 for every cell that slice, object and finger let through and that has a residual.
 export const shown = computed(() => {
   const table = touches.value;
   if (!table) return new Uint8Array(0);
   const mask = new Uint8Array(table.cells);
   const values = table.residuals(improved.value);
-  const inSlice = slice.value === null ? null : new Set(table.slices[slice.value] ?? []);
+  let inSlice: Uint8Array | null = null;
+  if (slice.value !== null) {
+    inSlice = new Uint8Array(table.cells);
+    for (const cell of table.slices[slice.value] ?? []) inSlice[cell] = 1;
+  }
   const wanted = object.value === null ? -1 : table.objects.indexOf(object.value);
   for (let cell = 0; cell < table.cells; ++cell) {
     if (Number.isNaN(values[cell])) continue;
     if (finger.value !== null && table.fingerOf(cell) !== finger.value) continue;
     if (wanted >= 0 && table.object[table.touchOf(cell)] !== wanted) continue;
-    if (inSlice && !inSlice.has(cell)) continue;
+    if (inSlice && !inSlice[cell]) continue;
     mask[cell] = 1;
   }
   return mask;
@@ -49,7 +57,7 @@ export const shownTouches = computed(() => {
   const mask = shown.value;
   const list: number[] = [];
   if (!table) return list;
-  for (let n = 0; n < table.size; ++n) if (table.cellsOf(n).some((cell) => mask[cell])) list.push(n);
+  for (let cell = 0; cell < table.cells; ++cell) if (mask[cell] && list[list.length - 1] !== table.touchOf(cell)) list.push(table.touchOf(cell));
   return list;
 });
 
@@ -84,6 +92,17 @@ export function walk(by: number): void {
 export function clearFilters(): void {
   slice.value = object.value = finger.value = touch.value = null;
 }
+
+export const parity = "parity";
+
+// What the residuals are drawn over: the choice, else the covariate that the error depends on most surely, else parity.
+export const shownCovariate = computed(() => {
+  const table = touches.value;
+  const known = (name: string) => table?.columns.some((column) => column.name === name);
+  if (covariate.value) return known(covariate.value) ? covariate.value : parity;
+  const telling = [...(entry.value?.data.curves ?? [])].filter((curve) => curve.p < 0.01 && known(curve.covariate)).sort((a, b) => a.p - b.p);
+  return telling[0]?.covariate ?? parity;
+});
 
 interface Field { key: string; read(): string; write(text: string): void }
 

@@ -23,15 +23,16 @@ export function drawCloud(canvas: HTMLCanvasElement, cloud: Cloud, frame: Frame)
   pen.scale(dense, dense);
   const colours = cloud.colours.map(resolved);
   const pale = resolved("--pale");
-  const size = cloud.x.length > manyPoints ? 1.5 : cloud.x.length > 4000 ? 2.2 : 3;
+  if (cloud.x.length > manyPoints) {
+    drawPixels(pen, canvas.width, canvas.height, dense, cloud, frame, [pale, ...colours].map((colour) => (colour.match(/[\d.]+/g) ?? []).map(Number)));
+    drawMarked(pen, cloud, frame, colours);
+    return;
+  }
+  const size = cloud.x.length > 4000 ? 2.2 : 3;
   // Pale ones beneath; then by colour, which is what costs.
   const pass = (colour: string, wanted: (i: number) => boolean, alpha: number) => {
     pen.fillStyle = colour;
     pen.globalAlpha = alpha;
-    if (cloud.x.length > manyPoints) {
-      for (let i = 0; i < cloud.x.length; ++i) if (wanted(i)) pen.fillRect(frame.x(cloud.x[i]) - size / 2, frame.y(cloud.y[i]) - size / 2, size, size);
-      return;
-    }
     pen.beginPath();
     for (let i = 0; i < cloud.x.length; ++i) {
       if (!wanted(i)) continue;
@@ -46,11 +47,33 @@ export function drawCloud(canvas: HTMLCanvasElement, cloud: Cloud, frame: Frame)
   pass(pale, (i) => !cloud.shown[i] && known(i), 0.55);
   colours.forEach((colour, group) => pass(colour, (i) => cloud.shown[i] === 1 && cloud.group[i] === group && known(i), cloud.x.length > 4000 ? 0.5 : 0.65));
   pen.globalAlpha = 1;
+  drawMarked(pen, cloud, frame, colours);
+}
+
+// Two by two pixels a point, those that are shown last: a path of arcs would take seconds.
+function drawPixels(pen: CanvasRenderingContext2D, width: number, height: number, dense: number, cloud: Cloud, frame: Frame, colours: number[][]): void {
+  const image = pen.createImageData(width, height);
+  const words = new Uint32Array(image.data.buffer);
+  const packed = colours.map(([r, g, b]) => (255 << 24) | (b << 16) | (g << 8) | r);
+  for (const shown of [0, 1]) {
+    for (let i = 0; i < cloud.x.length; ++i) {
+      if (cloud.shown[i] !== shown) continue;
+      const x = Math.round(frame.x(cloud.x[i]) * dense);
+      const y = Math.round(frame.y(cloud.y[i]) * dense);
+      if (!(x >= 0 && x < width - 1 && y >= 0 && y < height - 1)) continue;
+      const at = y * width + x;
+      words[at] = words[at + 1] = words[at + width] = words[at + width + 1] = packed[shown ? 1 + cloud.group[i] : 0];
+    }
+  }
+  pen.putImageData(image, 0, 0);
+}
+
+function drawMarked(pen: CanvasRenderingContext2D, cloud: Cloud, frame: Frame, colours: string[]): void {
   for (const i of cloud.marked) {
-    if (!known(i)) continue;
+    if (!Number.isFinite(cloud.x[i]) || !Number.isFinite(cloud.y[i])) continue;
     pen.beginPath();
     pen.arc(frame.x(cloud.x[i]), frame.y(cloud.y[i]), 6.5, 0, 7);
-    pen.fillStyle = colours[cloud.group[i]] ?? pale;
+    pen.fillStyle = colours[cloud.group[i]];
     pen.fill();
     pen.lineWidth = 2.5;
     pen.strokeStyle = resolved("--ink");

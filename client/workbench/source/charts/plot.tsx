@@ -77,13 +77,12 @@ export function Plot(props: PlotProps) {
   const up = along(props.y.range, height);
   const frame: Frame = { x: across, y: (value) => height - up(value), width, height };
   const draw = () => { if (canvas.current && props.cloud && full > 0) drawCloud(canvas.current, props.cloud, frame); };
-  useLayoutEffect(draw);
+  useLayoutEffect(draw, [props.cloud, full, props.height, theme.value, ...props.x.range, ...props.y.range]);
   useEffect(() => {
     const query = matchMedia("(prefers-color-scheme: dark)");
     query.addEventListener("change", draw);
     return () => query.removeEventListener("change", draw);
   });
-  void theme.value; // its colours are drawn, not styled
   const at = (event: MouseEvent) => {
     const box = canvas.current!.getBoundingClientRect();
     return nearest(props.cloud!, frame, event.clientX - box.left, event.clientY - box.top);

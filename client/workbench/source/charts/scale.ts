@@ -34,3 +34,15 @@ export function tickText(value: number): string {
   const text = size !== 0 && (size >= 1e6 || size < 1e-4) ? value.toExponential() : String(value);
   return text.replace("-", "\u2212");
 }
+
+// Half the width of the colour scale: 98 % of the sizes lie within; a round number.
+export function colourLimit(values: Float32Array): number {
+  const step = Math.max(1, Math.floor(values.length / 20000));
+  const sizes: number[] = [];
+  for (let i = 0; i < values.length; i += step) if (!Number.isNaN(values[i])) sizes.push(Math.abs(values[i]));
+  sizes.sort((a, b) => a - b);
+  const size = sizes[Math.floor(sizes.length * 0.98)] ?? 0;
+  if (!(size > 0)) return 1;
+  const power = 10 ** Math.floor(Math.log10(size));
+  return power * ([1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((round) => size <= round * power * 1.0001) ?? 10);
+}

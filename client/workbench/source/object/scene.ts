@@ -11,9 +11,21 @@ export interface Rod { from: number[]; to: number[]; colour: RGB; width: number;
 export interface View { azimuth: number; elevation: number; zoom: number }
 
 const manyPoints = 30000; // beyond this they are squares of few pixels
+export const movingPoints = 40000; // that are drawn while the object turns: an even sample; all when it rests
 
 const colourOf = ([r, g, b]: RGB) => new Color().setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);
 const vector = ([x, y, z]: number[]) => new Vector3(x, y, z);
+
+// 0 to size - 1; every beginning of it is spread evenly over all.
+function evenOrder(size: number): Uint32Array {
+  const order = Uint32Array.from({ length: size }, (_, i) => i);
+  if (size <= movingPoints) return order;
+  let stride = Math.floor(size * 0.6180339887) | 1;
+  const common = (a: number, b: number): number => (b ? common(b, a % b) : a);
+  while (common(stride, size) !== 1) stride += 2;
+  for (let i = 0, at = 0; i < size; ++i, at = (at + stride) % size) order[i] = at;
+  return order;
+}
 
 export class ObjectScene {
   view: View = { azimuth: 0.9, elevation: 0.45, zoom: 1 };
@@ -49,6 +61,8 @@ export class ObjectScene {
   private centre = new Vector3();
   private radius = 1;
   private waiting = 0;
+  private resting = 0;
+  private order: Uint32Array = new Uint32Array(0); // of the dots: every beginning of it is an even sample
 
   // Throws where there is no WebGL.
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -58,6 +72,7 @@ export class ObjectScene {
 
   dispose(): void {
     cancelAnimationFrame(this.waiting);
+    clearTimeout(this.resting);
     this.renderer.dispose();
   }
 
@@ -98,9 +113,18 @@ export class ObjectScene {
   setContacts(contacts: Contacts): void {
     if (this.points) { this.scene.remove(this.points); this.points.geometry.dispose(); }
     const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(contacts.positions, 3));
-    geometry.setAttribute("tint", new BufferAttribute(contacts.colours, 3, true));
-    geometry.setAttribute("seen", new BufferAttribute(contacts.shown, 1));
+    const size = contacts.shown.length;
+    this.order = evenOrder(size);
+    const positions = new Float32Array(3 * size);
+    const tints = new Uint8Array(3 * size);
+    const seen = new Uint8Array(size);
+    this.order.forEach((from, at) => {
+      for (let k = 0; k < 3; ++k) positions[3 * at + k] = contacts.positions[3 * from + k], tints[3 * at + k] = contacts.colours[3 * from + k];
+      seen[at] = contacts.shown[from];
+    });
+    geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    geometry.setAttribute("tint", new BufferAttribute(tints, 3, true));
+    geometry.setAttribute("seen", new BufferAttribute(seen, 1));
     this.points = new Points(geometry, this.dots);
     this.points.frustumCulled = false;
     const many = contacts.shown.length > manyPoints;
@@ -144,6 +168,10 @@ export class ObjectScene {
     this.view.azimuth -= azimuth;
     this.view.elevation = Math.min(1.55, Math.max(-1.55, this.view.elevation + elevation));
     this.draw();
+    // All dots come back when it rests.
+    this.points?.geometry.setDrawRange(0, movingPoints);
+    clearTimeout(this.resting);
+    this.resting = window.setTimeout(() => { this.points?.geometry.setDrawRange(0, Infinity); this.draw(); }, 200);
   }
 
   zoom(factor: number): void {
@@ -162,7 +190,7 @@ export class ObjectScene {
     const { azimuth, elevation, zoom } = this.view;
     const reach = 2.4 * this.radius;
     const away = new Vector3(Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation));
-    const half = (1.12 * this.radius) / zoom;
+    const half = (0.98 * this.radius) / zoom;
     const aspect = width / height;
     Object.assign(this.camera, { left: -half * Math.max(1, aspect), right: half * Math.max(1, aspect), top: half * Math.max(1, 1 / aspect), bottom: -half * Math.max(1, 1 / aspect), near: 0, far: 4 * reach });
     this.camera.up.set(0, 0, 1);
@@ -212,6 +240,6 @@ export class ObjectScene {
       least = apart;
       best = i;
     }
-    return best;
+    return best < 0 ? -1 : this.order[best];
   }
 }

@@ -3,7 +3,7 @@ import { Key, Section, Table } from "../parts/parts";
 import { Plot, type Mark } from "../charts/plot";
 import { type Range, rangeOf } from "../charts/scale";
 import { count, covariate, covariateName, error, fixed, probability, signedError, unitFor } from "../format";
-import { covariate as by, entry, hasImproved, improved, object, page, ranked, selectTouch, shown, touchIndex, touches } from "../state";
+import { covariate as by, entry, hasImproved, improved, object, page, parity, ranked, selectTouch, shown, shownCovariate, touchIndex, touches } from "../state";
 import { fingerColour } from "../colour";
 import type { Touches } from "../data/touches";
 import type { DataReport, Histogram, Kind } from "../data/report";
@@ -25,7 +25,7 @@ export function describeCell(table: Touches, kind: Kind, cell: number): string {
 
 function TouchPlot({ table, data }: { table: Touches; data: DataReport }) {
   const values = table.residuals(improved.value);
-  const column = table.columns.find(({ name }) => name === by.value);
+  const column = table.columns.find(({ name }) => name === shownCovariate.value);
   const x = new Float32Array(table.cells);
   const y = new Float32Array(table.cells);
   const group = new Uint8Array(table.cells);
@@ -56,8 +56,8 @@ function TouchPlot({ table, data }: { table: Touches; data: DataReport }) {
         ...Array.from({ length: table.cells }, (_, cell) => cell).filter((cell) => shown.value[cell]).map((cell) => [table.number[table.touchOf(cell)], table.objects[table.object[table.touchOf(cell)]] ?? "", table.names[table.fingerOf(cell)],
           column ? column.at(cell) : x[cell] / unit.factor, column ? values[cell] : y[cell] / unit.factor])]}
       head={
-        <label class="axis-choice">{column ? "Residual against" : "Measured against"} <select value={by.value} onChange={(event) => { by.value = event.currentTarget.value; }}>
-          <option value="">simulated (parity)</option>
+        <label class="axis-choice">{column ? "Residual against" : "Measured against"} <select value={shownCovariate.value} onChange={(event) => { by.value = event.currentTarget.value; }}>
+          <option value={parity}>simulated (parity)</option>
           {table.columns.map(({ name }) => <option value={name}>{covariateName(name)}</option>)}
         </select></label>
       }
@@ -73,7 +73,7 @@ export function TouchCard({ table, data }: { table: Touches; data: DataReport })
   const rank = ranked.value.indexOf(n);
   return (
     <div class="touch-card" data-touch={table.number[n]}>
-      <h4>Touch {table.number[n]} on {table.objects[table.object[n]]}{rank >= 0 && <span class="soft"> · {rank + 1} of {count(ranked.value.length)} by size</span>}</h4>
+      <h3>Touch {table.number[n]} on {table.objects[table.object[n]]}{rank >= 0 && <span class="soft"> · {rank + 1} of {count(ranked.value.length)} by size</span>}</h3>
       <Table title={`Touch ${table.number[n]}`} columns={["Finger", { title: "measured", number: true }, { title: "residual", number: true }, ...(hasImproved.value ? [{ title: "improved", number: true }] : []), { title: "contact x y z (mm)", number: true }]}
         rows={table.cellsOf(n).map((cell) => [table.names[table.fingerOf(cell)], error(data.kind, table.simulated[cell] + table.residual[cell]), signedError(data.kind, table.residual[cell]), ...(hasImproved.value ? [signedError(data.kind, table.after[cell])] : []), place(table.contact, cell, 1)])} />
       <p class="soft">Target {place(table.target, n, 1)} mm, approach {place(table.approach, n, 2)}. {table.columns.filter((column) => ["speed_mm_s", "session_time_s", "round", "face"].includes(column.name) && Number.isFinite(column.at(n * table.fingers)))

@@ -1,5 +1,5 @@
 // What is selected, always in sight: the same for every view.
-import { clearFilters, entry, finger, hasImproved, improved, object, page, ranked, selectTouch, session, shownTouches, slice, touch, touchEntries, touches, walk } from "../state";
+import { clearFilters, entry, finger, hasImproved, improved, object, page, selectTouch, session, shownTouches, slice, touch, touchEntries, touches, walk } from "../state";
 import { count, typeset } from "../format";
 
 function Chip({ text, clear }: { text: string; clear(): void }) {
@@ -31,8 +31,8 @@ export function Filters() {
       {touchEntries.value.length > 1 && <label>Session <select value={String(session.value)} onChange={(event) => { session.value = Number(event.currentTarget.value); clearFilters(); }}>
         {touchEntries.value.map(({ data: one, index }) => <option value={String(index)}>{one.session || page.value!.words.of_data[index].kind_name}</option>)}</select></label>}
       <span class="segments" role="group" aria-label="Touch by touch, the worst first">
-        <button type="button" onClick={() => walk(-1)} disabled={!ranked.value.length} aria-label="The touch before">‹</button>
-        <button type="button" onClick={() => walk(1)} disabled={!ranked.value.length} aria-label="The next touch, the worst first">› worst</button>
+        <button type="button" onClick={() => walk(-1)} disabled={!shownTouches.value.length} aria-label="The touch before">‹</button>
+        <button type="button" onClick={() => walk(1)} disabled={!shownTouches.value.length} aria-label="The next touch, the worst first">› worst</button>
       </span>
       {any && <button type="button" class="small quiet" onClick={clearFilters}>Clear</button>}
     </div>

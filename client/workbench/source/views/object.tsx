@@ -1,12 +1,12 @@
 // The object: its mesh with the residuals painted on, every contact, the selected touch with its fingers, the next touches.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { colourLimit, css, diverging, isDark, rgbOf } from "../colour";
+import { css, diverging, isDark, rgbOf } from "../colour";
 import { tickText } from "../charts/scale";
 import { Tools } from "../parts/tools";
 import { count, error, isPictures, unitFor } from "../format";
 import { paint, refined } from "../object/paint";
-import { ObjectScene, type Rod } from "../object/scene";
-import { entry, improved, object, page, selectTouch, shown, theme, touchIndex, touches, walk } from "../state";
+import { movingPoints, ObjectScene, type Rod } from "../object/scene";
+import { entry, improved, limit as colourScale, object, page, selectTouch, shown, theme, touchIndex, touches, walk } from "../state";
 import type { Touches } from "../data/touches";
 import type { DataReport } from "../data/report";
 import { describeCell } from "./compare";
@@ -17,6 +17,12 @@ function cellsOf(table: Touches, name: string): number[] {
   const list: number[] = [];
   for (let cell = 0; cell < table.cells; ++cell) if (table.object[table.touchOf(cell)] === wanted && !Number.isNaN(table.residual[cell])) list.push(cell);
   return list;
+}
+
+function contactsOf(table: Touches, cells: number[]): Float32Array {
+  const positions = new Float32Array(3 * cells.length);
+  cells.forEach((cell, i) => { for (let k = 0; k < 3; ++k) positions[3 * i + k] = table.contact[3 * cell + k]; });
+  return positions;
 }
 
 function objectToShow(table: Touches, data: DataReport): string {
@@ -52,6 +58,8 @@ function scaleBar(pixelsPerMm: number): { mm: number; px: number } {
 }
 
 function Overlay({ scene, labels }: { scene: ObjectScene; labels: { at: number[]; text: string }[] }) {
+  const [, redraw] = useState(0);
+  useEffect(() => { scene.onDraw = () => redraw((n) => n + 1); redraw(1); }, [scene]);
   const { clientWidth: width, clientHeight: height } = scene.canvas;
   const origin = scene.project(0, 0, 0);
   const bar = scaleBar(scene.pixelsPerMm());
@@ -94,10 +102,9 @@ export function ObjectView() {
   const [scene, setScene] = useState<ObjectScene | null>(null);
   const [failed, setFailed] = useState("");
   const [painted, setPainted] = useState(true);
-  const [, redraw] = useState(0);
   const [hover, setHover] = useState("");
   const name = table && data ? objectToShow(table, data) : "";
-  const limit = table ? colourLimit(table.residual) : 1;
+  const limit = colourScale.value;
   const cells = useRef<{ of: string; table: Touches | null; list: number[] }>({ of: "", table: null, list: [] });
   if (table && (cells.current.of !== name || cells.current.table !== table)) cells.current = { of: name, table, list: cellsOf(table, name) };
   const list = cells.current.list;
@@ -112,7 +119,6 @@ export function ObjectView() {
       setFailed("This browser has no WebGL, which the object needs; every other view works without it.");
       return;
     }
-    made.onDraw = () => redraw((n) => n + 1);
     const observer = new ResizeObserver(() => made.resize(canvas.current!.clientWidth, canvas.current!.clientHeight));
     observer.observe(canvas.current);
     setScene(made);
@@ -123,7 +129,7 @@ export function ObjectView() {
     if (!scene || !table || !data) return;
     const outline = data.outlines.find((one) => one.object === name);
     mesh.current = outline ? refined(outline.vertices_mm, outline.triangles) : null;
-    scene.setMesh(mesh.current, Float32Array.from(list.flatMap((cell) => [...table.contact.subarray(3 * cell, 3 * cell + 3)])));
+    scene.setMesh(mesh.current, contactsOf(table, list));
   }, [scene, table, name]);
 
   const mask = shown.value;
@@ -131,12 +137,13 @@ export function ObjectView() {
   useEffect(() => {
     if (!scene || !table) return;
     const values = table.residuals(improved.value);
-    const positions = new Float32Array(3 * list.length);
+    const positions = contactsOf(table, list);
+    const palette = Array.from({ length: 256 }, (_, i) => diverging(i / 127.5 - 1, night));
+    const tone = (value: number) => palette[Math.min(255, Math.max(0, Math.round(127.5 * (value / limit + 1))))] ?? palette[128];
     const colours = new Uint8Array(3 * list.length);
     const seen = new Uint8Array(list.length);
     list.forEach((cell, i) => {
-      positions.set(table.contact.subarray(3 * cell, 3 * cell + 3), 3 * i);
-      colours.set(diverging(values[cell] / limit, night), 3 * i);
+      colours.set(tone(values[cell]), 3 * i);
       seen[i] = mask[cell];
     });
     scene.setContacts({ positions, colours, shown: seen });
@@ -144,7 +151,7 @@ export function ObjectView() {
       const solid = rgbOf("--solid");
       const known = list.filter((cell) => mask[cell] && !Number.isNaN(values[cell]) && !Number.isNaN(table.contact[3 * cell]));
       const from = painted ? known : [];
-      scene.paint(paint(mesh.current, Float32Array.from(from.flatMap((cell) => [...table.contact.subarray(3 * cell, 3 * cell + 3)])), Float32Array.from(from, (cell) => values[cell]), 0.055 * scene.size, solid, (value) => diverging(value / limit, night)));
+      scene.paint(paint(mesh.current, contactsOf(table, from), Float32Array.from(from, (cell) => values[cell]), 0.055 * scene.size, solid, tone));
     }
   }, [scene, table, name, mask, improved.value, night, painted, theme.value]);
 
@@ -207,7 +214,7 @@ export function ObjectView() {
         <span class="zoom"><button type="button" aria-label="Nearer" onClick={() => scene?.zoom(1.25)}>+</button><button type="button" aria-label="Farther" onClick={() => scene?.zoom(1 / 1.25)}>−</button></span>
         {hover && <div class="hover" role="status">{hover}</div>}
       </div>
-      <figcaption><Scale limit={limit} data={data} /><span>Each dot is one finger&rsquo;s contact, where the given model puts it; between them their mean is painted.{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
+      <figcaption><Scale limit={limit} data={data} /><span>Each dot is one finger&rsquo;s contact, where the given model puts it; between them their mean is painted.{list.length > movingPoints && ` While it turns, an even sample of ${count(movingPoints)} is drawn.`}{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
     </figure>
   );
 }

@@ -18,7 +18,7 @@ function Slices({ data, linked }: { data: DataReport; linked: boolean }) {
         const body = (
           <>
             <span class="slice-name">{typeset(one.slice)}</span>
-            <span class="slice-words">{typeset(one.words)}</span>
+            <span class="slice-words">{typeset(one.words)} <small>mean {signedError(data.kind, one.mean_residual)}</small></span>
             <span class="slice-bar"><Bar share={one.share_of_excess_error} tone="given" /></span>
             <span class="slice-share">{share(one.share_of_excess_error)} <small>of the excess</small></span>
             <span class="slice-count">{count(one.count)} <small>{readings(data)}</small></span>
@@ -120,7 +120,7 @@ export function Where() {
         const linked = entry.value?.data === one;
         return <>{data.length > 1 && <h3>{page.value!.words.of_data[data.indexOf(one)].kind_name}</h3>}<Slices data={one} linked={linked} /></>;
       })}
-      <p class="note">Excess: the mean square error of the given model beyond the noise floor. Mean residuals: {known.map((one) => one.where[0] && `${typeset(one.where[0].slice)} ${signedError(one.kind, one.where[0].mean_residual)}`).filter(Boolean).join("; ")}. Residuals are measured minus simulated.</p>
+      <p class="note">Excess: the mean square error of the given model beyond the noise floor. Residuals are measured minus simulated: positive means that the real contact came later, or the picture is brighter, than the model says.</p>
     </Section>
   );
 }
