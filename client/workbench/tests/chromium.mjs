@@ -6,5 +6,5 @@ export const executable = process.env.CHROMIUM ?? "/usr/bin/chromium";
 export const hasChromium = () => existsSync(executable);
 
 export function launch() {
-  return chromium.launch({ executablePath: executable, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  return chromium.launch({ executablePath: executable, args: ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"] });
 }

@@ -27,6 +27,10 @@ await page.waitForSelector(".overlay");
 console.log(`${touches} touches, ${touches * fingers} contacts: loaded and drawn in ${((Date.now() - began) / 1000).toFixed(2)} s`);
 const canvas = page.locator(".stage canvas");
 await canvas.scrollIntoViewIfNeeded();
+// Processor time, which a busy machine does not change: of the process that draws, and of the page's own.
+const session = await browser.newBrowserCDPSession();
+const used = async (type) => (await session.send("SystemInfo.getProcessInfo")).processInfo.filter((one) => one.type === type).reduce((sum, one) => sum + one.cpuTime, 0);
+const [gpu, own] = [await used("GPU"), await used("renderer")];
 const rate = await canvas.evaluate(async (element) => {
   const box = element.getBoundingClientRect();
   const send = (type, x) => element.dispatchEvent(new PointerEvent(type, { clientX: box.left + x, clientY: box.top + 150, pointerId: 1, bubbles: true }));
@@ -41,7 +45,7 @@ const rate = await canvas.evaluate(async (element) => {
   element.getContext("webgl2").readPixels(0, 0, 1, 1, 6408, 5121, new Uint8Array(4));
   return (1000 * frames) / (performance.now() - start);
 });
-console.log(`turning: ${rate.toFixed(1)} frames a second`);
+console.log(`turning: ${rate.toFixed(1)} frames a second; processor time a frame: ${((1000 * ((await used("GPU")) - gpu)) / 65).toFixed(1)} ms to draw, ${((1000 * ((await used("renderer")) - own)) / 65).toFixed(1)} ms in the page`);
 const clicked = await page.evaluate(async () => {
   const start = performance.now();
   document.querySelector("button.slice").click();

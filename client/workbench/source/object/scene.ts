@@ -11,7 +11,7 @@ export interface Rod { from: number[]; to: number[]; colour: RGB; width: number;
 export interface View { azimuth: number; elevation: number; zoom: number }
 
 const manyPoints = 30000; // beyond this they are squares of few pixels
-export const movingPoints = 40000; // that are drawn while the object turns: an even sample; all when it rests
+export const movingPoints = 15000; // that are drawn while the object turns: an even sample; all when it rests
 
 const colourOf = ([r, g, b]: RGB) => new Color().setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);
 const vector = ([x, y, z]: number[]) => new Vector3(x, y, z);
@@ -62,11 +62,13 @@ export class ObjectScene {
   private radius = 1;
   private waiting = 0;
   private resting = 0;
+  private held = false;
   private order: Uint32Array = new Uint32Array(0); // of the dots: every beginning of it is an even sample
 
   // Throws where there is no WebGL.
-  constructor(readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+  constructor(readonly canvas: HTMLCanvasElement, many: boolean) {
+    // Smooth edges cost four times the pixels; the dots of a large set hide them.
+    this.renderer = new WebGLRenderer({ canvas, antialias: !many, alpha: true });
     this.scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), this.light, this.rods);
   }
 
@@ -171,12 +173,26 @@ export class ObjectScene {
     // All dots come back when it rests.
     this.points?.geometry.setDrawRange(0, movingPoints);
     clearTimeout(this.resting);
-    this.resting = window.setTimeout(() => { this.points?.geometry.setDrawRange(0, Infinity); this.draw(); }, 200);
+    if (!this.held) this.resting = window.setTimeout(() => this.hold(false), 500);
+  }
+
+  // While a pointer holds it, it turns.
+  hold(held: boolean): void {
+    this.held = held;
+    if (held || !this.points) return;
+    this.points.geometry.setDrawRange(0, Infinity);
+    this.draw();
   }
 
   zoom(factor: number): void {
     this.view.zoom = Math.min(12, Math.max(0.4, this.view.zoom * factor));
     this.draw();
+  }
+
+  // The picture as a data URL.
+  picture(): string {
+    this.drawNow();
+    return this.canvas.toDataURL();
   }
 
   draw(): void {

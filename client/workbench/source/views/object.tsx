@@ -114,7 +114,7 @@ export function ObjectView() {
     if (!canvas.current) return;
     let made: ObjectScene;
     try {
-      made = new ObjectScene(canvas.current);
+      made = new ObjectScene(canvas.current, list.length > movingPoints);
     } catch {
       setFailed("This browser has no WebGL, which the object needs; every other view works without it.");
       return;
@@ -170,7 +170,7 @@ export function ObjectView() {
 
   if (!table || !data || isPictures(data.kind)) return null;
   const place = (event: PointerEvent | MouseEvent): [number, number] => { const box = canvas.current!.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
-  const down = (event: PointerEvent) => { drag.current = { held: [event.clientX, event.clientY], moved: 0 }; canvas.current!.setPointerCapture(event.pointerId); };
+  const down = (event: PointerEvent) => { drag.current = { held: [event.clientX, event.clientY], moved: 0 }; canvas.current!.setPointerCapture(event.pointerId); scene?.hold(true); };
   const move = (event: PointerEvent) => {
     if (!scene) return;
     const now = drag.current;
@@ -187,6 +187,7 @@ export function ObjectView() {
   const up = (event: PointerEvent) => {
     const moved = drag.current.moved;
     drag.current = { held: null, moved: 0 };
+    scene?.hold(false);
     if (moved > 4 || !scene) return;
     const at = scene.pick(...place(event));
     selectTouch(at >= 0 ? table.touchOf(list[at]) : null);
@@ -200,13 +201,13 @@ export function ObjectView() {
       <div class="plot-head">
         <div class="plot-title"><b>{name}</b> <span class="soft">{count(list.length)} contacts</span></div>
         <label class="check"><input type="checkbox" checked={painted} onChange={(event) => setPainted(event.currentTarget.checked)} /> paint</label>
-        <Tools title={`Residuals on ${name}`} svg={() => svg.current?.querySelector("svg") ?? null} under={() => `<image width="${canvas.current!.clientWidth}" height="${canvas.current!.clientHeight}" href="${canvas.current!.toDataURL()}"/>`}
+        <Tools title={`Residuals on ${name}`} svg={() => svg.current?.querySelector("svg") ?? null} under={() => `<image width="${canvas.current!.clientWidth}" height="${canvas.current!.clientHeight}" href="${scene?.picture()}"/>`}
           rows={() => [["touch", "finger", "x_mm", "y_mm", "z_mm", `residual_${data.unit}`, `after_${data.unit}`], ...list.filter((cell) => mask[cell]).map((cell) => [table.number[table.touchOf(cell)], table.names[table.fingerOf(cell)], table.contact[3 * cell], table.contact[3 * cell + 1], table.contact[3 * cell + 2], table.residual[cell], table.after[cell]])]} />
       </div>
       <div class="stage" ref={svg}>
         {failed ? <p class="empty">{failed}</p> : (
           <canvas ref={canvas} tabIndex={0} role="application" aria-label={`Residuals on ${name}. Arrow keys turn it, plus and minus zoom, Enter goes to the next touch, the worst first.`}
-            onPointerDown={down} onPointerMove={move} onPointerUp={up} onPointerCancel={() => { drag.current = { held: null, moved: 0 }; }} onPointerLeave={() => setHover("")}
+            onPointerDown={down} onPointerMove={move} onPointerUp={up} onPointerCancel={() => { drag.current = { held: null, moved: 0 }; scene?.hold(false); }} onPointerLeave={() => setHover("")}
             onWheel={(event) => { if (event.ctrlKey) { event.preventDefault(); scene?.zoom(event.deltaY < 0 ? 1.1 : 1 / 1.1); } }}
             onKeyDown={(event) => { const act = keys[event.key]; if (act && !event.ctrlKey) { event.preventDefault(); act(); } }} />
         )}
