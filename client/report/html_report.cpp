@@ -69,9 +69,9 @@ json PageWords(const v1::Report& report) {
     words["problems"].push_back(
         {{"title", ProblemTitle(problem)}, {"fix", ShellLines(problem.fix(), kCommandColumns)}});
   for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report))
-    words["ambiguities"].push_back(
-        {{"effects", json(std::vector<std::string>(ambiguity->effects().begin(), ambiguity->effects().end()))},
-         {"to_decide", ToDecide(ambiguity->discriminating_measurement())}});
+    words["ambiguities"].push_back({{"effects", json(std::vector<std::string>(ambiguity->effects().begin(),
+                                                                              ambiguity->effects().end()))},
+                                    {"to_decide", ToDecide(ambiguity->discriminating_measurement())}});
   for (const v1::NextMeasurement& next : report.next()) words["next"].push_back(CountToVerdict(next));
   for (const v1::Step& step : report.steps()) words["steps"].push_back(StepName(step));
   return words;
@@ -84,10 +84,12 @@ absl::StatusOr<std::string> PageData(const v1::Report& report) {
   // The table of touches says what these two do, and to which touch they belong.
   for (v1::DataReport& data : *shown.mutable_data())
     if (data.has_touch_table()) data.clear_parity(), data.clear_surface_points();
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string report_json, ReportToJson(std::move(shown), /*whitespace=*/false));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string report_json,
+                              ReportToJson(std::move(shown), /*whitespace=*/false));
   // What nlohmann writes is escaped where text of others is no UTF-8.
-  return absl::StrCat("{\"report\":", report_json, ",\"words\":",
-                      PageWords(report).dump(-1, ' ', false, json::error_handler_t::replace), "}");
+  return absl::StrCat("{\"report\":", report_json,
+                      ",\"words\":", PageWords(report).dump(-1, ' ', false, json::error_handler_t::replace),
+                      "}");
 }
 
 absl::StatusOr<std::string> HtmlReport(const v1::Report& report) {
