@@ -18,6 +18,7 @@
 #include "client/cli/journal_session.h"
 #include "client/cli/session_images.h"
 #include "client/report/report.h"
+#include "client/workbench/page.h"
 #include "server/base/check.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -256,6 +257,9 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 
 absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                                              const ComparisonOptions& options) {
+  // Said before an hour of diagnosis, not after.
+  if (const absl::Status page = workbench::PageTemplate().status(); !options.html.empty() && !page.ok())
+    return absl::Status(page.code(), absl::StrCat("--html: ", page.message()));
   std::unique_ptr<Comparison> comparison(new Comparison(cli));
   v1::Evidence& evidence = comparison->evidence_;
   evidence.set_seed(options.seed);
@@ -416,7 +420,8 @@ absl::Status Comparison::SendAhead() {
 
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
   if (!options.html.empty()) {
-    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.html, client::HtmlReport(report)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::string page, client::HtmlReport(report));
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.html, page));
     cli.LogWritten(options.html);
   }
   if (options.json.empty()) return absl::OkStatus();

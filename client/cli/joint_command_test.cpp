@@ -111,7 +111,8 @@ TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
     EXPECT_LT(final, 0.7 * initial) << data["unit"];
     EXPECT_EQ(data["after_step"].size(), report["steps"].size());
   }
-  for (const char* part : {"rendered after", "Touches and pictures", "Touches alone", "photographs alone"})
+  for (const char* part :
+       {"\"shown_by\":[\"TOUCHES\",\"PHOTOGRAPHS\"]", "\"touch_table\":{", "\"after_png\":\"iVBOR"})
     EXPECT_THAT(Read("report.html"), HasSubstr(part));
 
   // A session of both that a server keeps says the same.

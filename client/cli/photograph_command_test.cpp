@@ -74,8 +74,8 @@ TEST_F(PhotographCommand, EveryErrorOfADiagnosisIsFoundAgainByComparisons) {
               improved["photographs"]["silhouette_iou"].get<double>(), 1e-3);
   // The page carries its pictures and loads nothing.
   const std::string page = Read("report.html");
-  EXPECT_THAT(page, HasSubstr("data:image/png;base64,iVBOR"));
-  EXPECT_THAT(page, HasSubstr("rendered after"));
+  EXPECT_THAT(page, HasSubstr("\"measured_png\":\"iVBOR"));
+  EXPECT_THAT(page, HasSubstr("\"residual_after_png\":\"iVBOR"));
   EXPECT_EQ(page.find("src=\"http"), std::string::npos);
 }
 

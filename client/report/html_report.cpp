@@ -1,39 +1,105 @@
-// The page: the verdict first, then what to do, then the evidence for it.
+// The page: its template with the report and the sentences that the terminal shows too.
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <nlohmann/json.hpp>
 
-#include "client/report/html_page.h"
 #include "client/report/joint.h"
+#include "client/report/next_commands.h"
 #include "client/report/report.h"
+#include "client/report/report_json.h"
 #include "client/report/words.h"
-#include "server/base/units.h"
+#include "client/workbench/page.h"
+#include "server/base/printable.h"
+#include "server/base/status.h"
 
 namespace touchstone::client {
+namespace {
 
-std::string HtmlReport(const v1::Report& report) {
-  std::string page = absl::StrCat(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
-      "script-src 'unsafe-inline'",
-      MainData(report).photographs().maps().empty() ? "" : "; img-src data:", "\">\n<title>",
-      Escape(report.model_name().empty() ? "Touchstone report"
-                                         : absl::StrCat("Touchstone report: ", report.model_name())),
-      "</title>\n<style>", HtmlStyle(), "</style>\n</head>\n<body>\n<main>\n");
-  // Where nothing of the catalogue is the answer, what is known of the rest comes before what was tried.
-  const bool no_name = report.verdict() == v1::Report::UNEXPLAINED && report.steps().empty();
-  for (const auto part :
-       {HtmlHead, HtmlDataProblems, HtmlJoint, HtmlWhatToDo, HtmlDistributions,
-        no_name ? HtmlUnexplained : HtmlWhy, no_name ? HtmlWhy : HtmlUnexplained, HtmlPhotographs, HtmlWhere,
-        HtmlObjects, HtmlFit, HtmlNextTouches, HtmlNextPhotographs, HtmlData, HtmlMethods, HtmlProvenance}) {
-    page += part(report);
+using nlohmann::json;
+
+constexpr int kCommandColumns = 96;  // that a page has room for
+
+json NumberOrNull(double value) {
+  return std::isfinite(value) ? json(value) : json();
+}
+
+json LadderJson(const v1::Report& report) {
+  static const char* const kKinds[] = {"given", "refit", "step", "suggestion", "floor"};
+  json rungs = json::array();
+  for (const Rung& rung : Ladder(report))
+    rungs.push_back({{"kind", kKinds[rung.kind]},
+                     {"name", rung.name},
+                     {"rmse", NumberOrNull(rung.rmse)},
+                     {"heldout_rmse", NumberOrNull(rung.heldout_rmse)},
+                     {"lack_of_fit_p", NumberOrNull(rung.lack_of_fit_p)}});
+  return rungs;
+}
+
+json DataJson(const v1::DataReport& data) {
+  const Floor floor = NoiseFloorOf(data);
+  return {{"kind_name", KindName(data.kind())},
+          {"floor", floor.sigma},
+          {"floor_is_bound", floor.bound},
+          {"finger_bias", FingerBiasWords(data)},
+          {"nearest_effect", NearestEffectWords(data.unexplained())}};
+}
+
+// Sentences, names and commands that need the rules of words.h; the page writes numbers itself.
+json PageWords(const v1::Report& report) {
+  const v1::DataReport& main = MainData(report);
+  json words = {{"headline", Headline(report)},
+                {"summary", IsJoint(report) ? report.summary() : SummaryToShow(report)},
+                {"data", DataInWords(report, "\u00d7")},
+                {"floor", NoiseFloorSentence(main)},
+                {"times_the_floor", TimesTheFloor(report)},
+                {"nothing_missing", NothingMissingWords(report)},
+                {"finger_scatter",
+                 report.verdict() == v1::Report::ADEQUATE ? std::string() : FingerScatterWords(report)},
+                {"ladder", LadderJson(report)},
+                {"command", ShellLines(report.provenance().command(), kCommandColumns)}};
+  for (const char* list : {"commands", "problems", "ambiguities", "next", "steps", "of_data"})
+    words[list] = json::array();
+  for (int i = 0; i < report.data_size(); ++i) {
+    words["of_data"].push_back(DataJson(report.data(i)));
+    if (&report.data(i) == &main) words["main"] = i;
   }
-  absl::StrAppend(&page, "<footer>Made by Touchstone", report.version().empty() ? "" : " ",
-                  Escape(report.version()));
-  if (report.duration_s() > 0)
-    absl::StrAppend(&page, " in ", Typeset(Time(report.duration_s() * kMicrosecondsPerSecond)));
-  absl::StrAppend(&page, ". This file is self-contained: it loads nothing.</footer>\n</main>\n<script>",
-                  HtmlScript(), "</script>\n</body>\n</html>\n");
-  return page;
+  for (const NextCommand& next : NextCommands(report))
+    words["commands"].push_back({{"purpose", next.purpose}, {"command", next.command}});
+  for (const v1::DataProblem& problem : report.data_problems())
+    words["problems"].push_back(
+        {{"title", ProblemTitle(problem)}, {"fix", ShellLines(problem.fix(), kCommandColumns)}});
+  for (const v1::Ambiguity* ambiguity : OtherAmbiguities(report))
+    words["ambiguities"].push_back({{"effects", json(std::vector<std::string>(ambiguity->effects().begin(),
+                                                                              ambiguity->effects().end()))},
+                                    {"to_decide", ToDecide(ambiguity->discriminating_measurement())}});
+  for (const v1::NextMeasurement& next : report.next()) words["next"].push_back(CountToVerdict(next));
+  for (const v1::Step& step : report.steps()) words["steps"].push_back(StepName(step));
+  return words;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> PageData(const v1::Report& report) {
+  v1::Report shown = report;
+  // The table of touches says what these two do, and to which touch they belong.
+  for (v1::DataReport& data : *shown.mutable_data())
+    if (data.has_touch_table()) data.clear_parity(), data.clear_surface_points();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string report_json,
+                              ReportToJson(std::move(shown), /*whitespace=*/false));
+  // What nlohmann writes is escaped where text of others is no UTF-8.
+  return absl::StrCat("{\"report\":", report_json,
+                      ",\"words\":", PageWords(report).dump(-1, ' ', false, json::error_handler_t::replace),
+                      "}");
+}
+
+absl::StatusOr<std::string> HtmlReport(const v1::Report& report) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const absl::string_view page, workbench::PageTemplate());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string data, PageData(report));
+  const size_t mark = page.find(workbench::kDataMark);
+  // "</script>" in a name must not end the element.
+  return absl::StrCat(page.substr(0, mark),
+                      absl::StrReplaceAll(EscapeInJson(data), {{"<", "\\u003c"}, {">", "\\u003e"}}),
+                      page.substr(mark + workbench::kDataMark.size()));
 }
 
 }  // namespace touchstone::client

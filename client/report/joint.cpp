@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "client/report/error_scale.h"
-#include "client/report/html_page.h"
 
 namespace touchstone::client {
 namespace {
@@ -89,23 +88,6 @@ void AddTable(const JointTable& table, TextLayout* out) {
   out->Rows(rows);
 }
 
-std::string HtmlTable(const JointTable& table, const std::string& css_class) {
-  std::vector<std::string> titles;
-  for (size_t i = 0; i < table.titles.size(); ++i) {
-    std::string title = table.titles[i];
-    if (!title.empty()) title[0] = absl::ascii_toupper(title[0]);
-    titles.push_back(table.IsText(i) ? title : absl::StrCat(">", title));
-  }
-  std::string html = absl::StrCat("<table", css_class, ">", HeaderRow(titles), "<tbody>");
-  for (const std::vector<std::string>& row : table.rows) {
-    html += "<tr>";
-    for (size_t i = 0; i < row.size(); ++i)
-      html += table.IsText(i) ? Cell(Escape(row[i])) : NumberCell(row[i]);
-    html += "</tr>\n";
-  }
-  return html + "</tbody></table>";
-}
-
 }  // namespace
 
 std::string FallsOfBoth(const v1::Report& report) {
@@ -128,25 +110,6 @@ void AddJoint(const v1::Report& report, TextLayout* out) {
   if (!values.rows.empty()) AddTable(values, out);
   // A comparison has no more to say of both.
   if (report.verdict() != v1::Report::VERDICT_UNSPECIFIED) out->Paragraph(report.summary());
-}
-
-std::string HtmlJoint(const v1::Report& report) {
-  if (!IsJoint(report)) return "";
-  std::string body =
-      Figure(HtmlTable(LadderOfBoth(report), " class=\"narrow\""),
-             "RMSE of both kinds of data after each step, as comparisons with that model find it.");
-  const JointTable values = ValuesOfBoth(report);
-  if (!values.rows.empty()) {
-    body += Figure(
-        absl::StrCat("<div class=\"scroll\">", HtmlTable(values, ""), "</div>"),
-        "Fitted to the sum of both log likelihoods. Alone: the standard error that either kind of data would "
-        "leave by itself.");
-  }
-  return Section("both", "Touches and pictures",
-                 "What both kinds of data show together, and what only one of them shows.",
-                 absl::StrCat(body, report.verdict() == v1::Report::VERDICT_UNSPECIFIED
-                                        ? ""
-                                        : absl::StrCat("<p>", Typeset(report.summary()), "</p>\n")));
 }
 
 }  // namespace touchstone::client

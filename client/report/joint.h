@@ -14,6 +14,5 @@ std::string FallsOfBoth(const v1::Report& report);
 // The ladder of both errors, the shared values with what either kind alone would give, and the summary. Nothing unless
 // IsJoint.
 void AddJoint(const v1::Report& report, TextLayout* out);
-std::string HtmlJoint(const v1::Report& report);
 
 }  // namespace touchstone::client

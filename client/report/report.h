@@ -1,4 +1,4 @@
-// A diagnosis report (proto/touchstone/v1/diagnosis.proto) for people and for programs. All three are pure
+// A diagnosis report (proto/touchstone/v1/diagnosis.proto) for people and for programs. All are pure
 // functions of the report; a field that is empty leaves its part out.
 #pragma once
 
@@ -15,8 +15,13 @@ namespace touchstone::client {
 // which take no columns.
 std::string TerminalReport(const v1::Report& report, int width, bool colour);
 
-// One HTML file that opens offline: styles, pictures and the script are inside, nothing is fetched.
-std::string HtmlReport(const v1::Report& report);
+// One HTML file that opens offline: client/workbench's page with the report's data inside; nothing is fetched. An error where
+// this build has no page.
+absl::StatusOr<std::string> HtmlReport(const v1::Report& report);
+
+// The page's data, JSON: `report` (protobuf JSON with the table of touches, which JsonReport leaves out) and `words`, sentences
+// that the terminal shows too.
+absl::StatusOr<std::string> PageData(const v1::Report& report);
 
 // Protobuf JSON with the names of the proto file. Every primitive and repeated field is there, and `initial`,
 // `final` and `unexplained` of each entry of data too, so that a reader need not ask. As everywhere in protobuf JSON, a number that

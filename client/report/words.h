@@ -1,5 +1,5 @@
 // Numbers, units and sentences of a report, as terminal and page both show them. Plain ASCII ("+-", "us",
-// "->"); the page sets them in type (html_page.h).
+// "->"); the page sets them in type.
 #pragma once
 
 #include <string>

@@ -202,12 +202,17 @@ class Report:
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them."""
+        """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them; without the table of touches,
+        which is for a page and stays in `message`."""
+        shown = diagnosis_pb2.Report()
+        shown.CopyFrom(self.message)
+        for data in shown.data:
+            data.ClearField("touch_table")
         try:
-            return json_format.MessageToDict(self.message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
+            return json_format.MessageToDict(shown, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
         except TypeError:  # protobuf before 5
             old_name: dict[str, Any] = {"including_default_value_fields": True}
-            return json_format.MessageToDict(self.message, preserving_proto_field_name=True, **old_name)
+            return json_format.MessageToDict(shown, preserving_proto_field_name=True, **old_name)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes it as JSON."""

@@ -130,6 +130,7 @@ struct DataReport {
   std::vector<residuals::ParityPoint> parity;
   std::vector<residuals::SurfaceResidual> surface_points;
   std::vector<residuals::DrawableObject> outlines;
+  residuals::TouchTable table;
 
   std::optional<PhotographDescription> photographs;
   std::optional<distributions::PoseFreeComparison> distributions;

@@ -107,6 +107,7 @@ void AddResiduals(residuals::ResidualSummary residuals, DataReport* data) {
   data->parity = std::move(residuals.parity);
   data->surface_points = std::move(residuals.surface_points);
   data->outlines = std::move(residuals.outlines);
+  data->table = std::move(residuals.table);
 }
 
 }  // namespace touchstone::diagnosis::report

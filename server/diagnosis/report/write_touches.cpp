@@ -1,4 +1,6 @@
 // What only touches have: fingers, histograms, points on surfaces.
+#include <cmath>
+
 #include "server/base/units.h"
 #include "server/diagnosis/report/write_data_report.h"
 
@@ -52,6 +54,44 @@ void WriteOutline(const residuals::DrawableObject& outline, v1::ObjectOutline* m
     for (const uint32_t corner : triangle) message->add_triangles(corner);
 }
 
+// Five significant digits: what a picture shows, in few bytes.
+float Rounded(double value) {
+  if (!std::isfinite(value) || value == 0) return static_cast<float>(value);
+  const double step = std::pow(10.0, std::floor(std::log10(std::abs(value))) - 4);
+  return static_cast<float>(std::round(value / step) * step);
+}
+
+void WriteVectors(const std::vector<Eigen::Vector3d>& vectors, double scale,
+                  google::protobuf::RepeatedField<float>* message) {
+  for (const Eigen::Vector3d& vector : vectors)
+    for (int axis = 0; axis < 3; ++axis) message->Add(Rounded(scale * vector[axis]));
+}
+
+void WriteTable(const residuals::TouchTable& table, v1::TouchTable* message) {
+  message->set_touches_in_all(static_cast<uint32_t>(table.touches_in_all));
+  message->set_spacing_mm(table.spacing_m * kMillimetresPerMetre);
+  *message->mutable_touch() = {table.touch.begin(), table.touch.end()};
+  *message->mutable_object() = {table.object.begin(), table.object.end()};
+  WriteVectors(table.target_m, kMillimetresPerMetre, message->mutable_target_mm());
+  WriteVectors(table.approach, 1, message->mutable_approach());
+  WriteVectors(table.lateral, 1, message->mutable_lateral());
+  WriteVectors(table.contact_m, kMillimetresPerMetre, message->mutable_contact_mm());
+  for (const double standoff_m : table.standoff_m)
+    message->add_standoff_mm(Rounded(standoff_m * kMillimetresPerMetre));
+  for (const double time_s : table.simulated_s) message->add_simulated(Rounded(Microseconds(time_s)));
+  for (const double time_s : table.residual_s) message->add_residual(Rounded(Microseconds(time_s)));
+  for (const double time_s : table.after_s) message->add_after(Rounded(Microseconds(time_s)));
+  for (const residuals::TableCovariate& covariate : table.covariates) {
+    v1::TouchTable::Covariate* column = message->add_covariates();
+    column->set_name(covariate.name);
+    column->set_unit(covariate.unit);
+    *column->mutable_labels() = {covariate.labels.begin(), covariate.labels.end()};
+    for (const double value : covariate.values) column->add_values(Rounded(value));
+  }
+  for (const std::vector<uint32_t>& cells : table.slice_cells)
+    *message->add_slices()->mutable_cells() = {cells.begin(), cells.end()};
+}
+
 }  // namespace
 
 void WriteTouches(const DataReport& data, v1::DataReport* message) {
@@ -73,6 +113,7 @@ void WriteTouches(const DataReport& data, v1::DataReport* message) {
     WriteSurfacePoint(point, message->add_surface_points());
   for (const residuals::DrawableObject& outline : data.outlines)
     WriteOutline(outline, message->add_outlines());
+  if (data.table.size() > 0) WriteTable(data.table, message->mutable_touch_table());
 }
 
 }  // namespace touchstone::diagnosis::report

@@ -16,6 +16,7 @@ ResidualSummary DescribeResiduals(const touches::Observations& observations,
   summary.parity = MakeParity(observations, initial, before, after);
   summary.surface_points = MakeSurfaceResiduals(observations, improved, before, after);
   summary.outlines = MakeOutlines(observations);
+  summary.table = MakeTouchTable(observations, initial, before, after, summary.slices, scale.spacing_m);
   return summary;
 }
 

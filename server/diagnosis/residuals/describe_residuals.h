@@ -12,6 +12,7 @@
 #include "server/diagnosis/residuals/parity.h"
 #include "server/diagnosis/residuals/slices.h"
 #include "server/diagnosis/residuals/surface_points.h"
+#include "server/diagnosis/residuals/touch_table.h"
 #include "server/diagnosis/residuals/worst_touches.h"
 
 namespace touchstone::diagnosis::residuals {
@@ -27,6 +28,7 @@ struct ResidualSummary {
   std::vector<ParityPoint> parity;
   std::vector<SurfaceResidual> surface_points;
   std::vector<DrawableObject> outlines;
+  TouchTable table;
 };
 
 // `before` and `after` are the residuals of the predictions `initial` and `improved`, which may be the same:

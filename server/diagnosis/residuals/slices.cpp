@@ -147,6 +147,8 @@ double SliceFinder::TotalExcess() const {
 }
 
 ErrorSlice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_s2) const {
+  ErrorSlice described;
+  described.cells.resize(residuals_.size());
   int touches = 0;
   double cells = 0, sum = 0, squares = 0, excess = 0;
   for (int k = 0; k < observations_.size(); ++k) {
@@ -157,6 +159,7 @@ ErrorSlice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_
       const double residual_s = residuals_[size_t(k) * observations_.fingers + i];
       if (std::isnan(residual_s) || !HoldsAt(slice, k, i)) continue;
       any = true;
+      described.cells[size_t(k) * observations_.fingers + i] = true;
       ++cells;
       sum += residual_s;
       squares += residual_s * residual_s;
@@ -167,7 +170,6 @@ ErrorSlice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_
   std::vector<std::string> conditions;
   for (const SliceCondition& condition : slice.conditions)
     conditions.push_back(bins_[condition.covariate].Words(condition.low, condition.high));
-  ErrorSlice described;
   described.conditions = absl::StrJoin(conditions, " and ");
   described.touches = touches;
   // The mean over whole touches is zero except for rounding.

@@ -18,6 +18,7 @@ struct ErrorSlice {
   double mean_residual_s = 0;        // over the slice's fingers
   double rmse_s = 0;                 // root of their mean square residual
   double share_of_excess_error = 0;  // of the whole set's excess error, 0 to 1
+  std::vector<char> cells;           // [k * fingers + finger]: whether it is in the slice
 };
 
 // At most six slices that hold more of the excess error than their size, or a bias of their own, largest

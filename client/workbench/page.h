@@ -1,0 +1,15 @@
+// The page of the report, built from source/ by Vite and part of this program.
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <absl/strings/string_view.h>
+
+namespace touchstone::workbench {
+
+// The whole file, with kDataMark once where the data belong: the text of a <script type="application/json">. An error where
+// this build has no page; it says why, and how to get one.
+absl::StatusOr<absl::string_view> PageTemplate();
+
+inline constexpr absl::string_view kDataMark = "@TOUCHSTONE_DATA@";
+
+}  // namespace touchstone::workbench

@@ -1,0 +1,133 @@
+// A chart with two axes: lines, steps, whiskers and dots as SVG, a cloud of points on a canvas beneath.
+import { type ComponentChildren } from "preact";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { theme } from "../state";
+import { Tools } from "../parts/tools";
+import { type Cloud, type Frame, cloudSvg, drawCloud, nearest } from "./cloud";
+import type { Row } from "./export";
+import { type Range, ticks, tickText } from "./scale";
+
+export interface Axis { title: string; range: Range; labels?: string[] }
+
+export type Mark =
+  | { kind: "line"; points: [number, number][]; colour: string; dashed?: boolean }
+  | { kind: "dots"; points: [number, number][]; colour: string }
+  | { kind: "whiskers"; points: [number, number, number][]; colour: string }
+  | { kind: "steps"; edges: number[]; values: number[]; colour: string; filled?: boolean }
+  | { kind: "band"; low: number; high: number };
+
+export interface PlotProps {
+  title: string; // also of the files
+  label: string; // for people who do not see it
+  x: Axis; y: Axis; height: number; marks: Mark[]; cloud?: Cloud;
+  rows(): Row[];
+  onPick?(point: number): void;
+  describe?(point: number): string;
+  head?: ComponentChildren; caption?: ComponentChildren;
+}
+
+const margin = { left: 52, right: 12, top: 10, bottom: 40 };
+
+// Its width is that of its place.
+function useWidth(): [(element: HTMLDivElement | null) => void, number] {
+  const [width, setWidth] = useState(0);
+  const observer = useRef<ResizeObserver | null>(null);
+  const attach = useRef((element: HTMLDivElement | null) => {
+    observer.current?.disconnect();
+    if (!element) return;
+    setWidth(element.clientWidth);
+    observer.current = new ResizeObserver(() => setWidth(element.clientWidth));
+    observer.current.observe(element);
+  });
+  return [attach.current, width];
+}
+
+function MarkShape({ mark, frame }: { mark: Mark; frame: Frame }) {
+  const path = (points: [number, number][]) =>
+    points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y)).map(([x, y], i) => `${i ? "L" : "M"}${frame.x(x).toFixed(1)} ${frame.y(y).toFixed(1)}`).join("");
+  switch (mark.kind) {
+    case "line":
+      return <path d={path(mark.points)} fill="none" stroke={mark.colour} stroke-width="1.8" stroke-linejoin="round" stroke-dasharray={mark.dashed ? "5 4" : undefined} />;
+    case "dots":
+      return <g fill={mark.colour}>{mark.points.filter(([, y]) => Number.isFinite(y)).map(([x, y]) => <circle cx={frame.x(x)} cy={frame.y(y)} r="2.6" />)}</g>;
+    case "whiskers":
+      return <path fill="none" stroke={mark.colour} stroke-width="1" opacity=".7"
+        d={mark.points.filter((p) => p.every(Number.isFinite)).map(([x, low, high]) => `M${frame.x(x).toFixed(1)} ${frame.y(low).toFixed(1)}V${frame.y(high).toFixed(1)}`).join("")} />;
+    case "steps": {
+      const { edges, values } = mark;
+      let d = `M${frame.x(edges[0])} ${frame.y(0)}`;
+      values.forEach((value, i) => { d += `V${frame.y(Number.isFinite(value) ? value : 0).toFixed(1)}H${frame.x(edges[i + 1]).toFixed(1)}`; });
+      d += `V${frame.y(0)}`;
+      return mark.filled ? <path d={`${d}Z`} fill={mark.colour} /> : <path d={d} fill="none" stroke={mark.colour} stroke-width="1.6" />;
+    }
+    case "band":
+      return <rect x="0" width={frame.width} y={frame.y(mark.high)} height={Math.max(0.5, frame.y(mark.low) - frame.y(mark.high))} fill="var(--band)" />;
+  }
+}
+
+export function Plot(props: PlotProps) {
+  const [attach, full] = useWidth();
+  const svg = useRef<SVGSVGElement>(null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const [hover, setHover] = useState("");
+  const width = Math.max(40, full - margin.left - margin.right);
+  const height = Math.max(40, props.height - margin.top - margin.bottom);
+  const along = (range: Range, size: number) => (value: number) => ((value - range[0]) / (range[1] - range[0])) * size;
+  const across = along(props.x.range, width);
+  const up = along(props.y.range, height);
+  const frame: Frame = { x: across, y: (value) => height - up(value), width, height };
+  const draw = () => { if (canvas.current && props.cloud && full > 0) drawCloud(canvas.current, props.cloud, frame); };
+  useLayoutEffect(draw, [props.cloud, full, props.height, theme.value, ...props.x.range, ...props.y.range]);
+  useEffect(() => {
+    const query = matchMedia("(prefers-color-scheme: dark)");
+    query.addEventListener("change", draw);
+    return () => query.removeEventListener("change", draw);
+  });
+  const at = (event: MouseEvent) => {
+    const box = canvas.current!.getBoundingClientRect();
+    return nearest(props.cloud!, frame, event.clientX - box.left, event.clientY - box.top);
+  };
+  const move = (event: MouseEvent) => {
+    const point = at(event);
+    setHover(point >= 0 && props.describe ? props.describe(point) : "");
+  };
+  const xTicks = props.x.labels ? props.x.labels.map((_, i) => i) : ticks(props.x.range, Math.max(2, width / 80));
+  const yTicks = ticks(props.y.range, Math.max(2, height / 45));
+  return (
+    <figure class="plot">
+      <div class="plot-head">
+        <div class="plot-title">{props.head ?? props.title}</div>
+        <Tools title={props.title} rows={props.rows} svg={() => svg.current} under={() =>
+          props.cloud ? `<g transform="translate(${margin.left} ${margin.top})" fill="none">${cloudSvg(props.cloud, frame)}</g>` : ""} />
+      </div>
+      <div class="plot-body" ref={attach} style={{ height: `${props.height}px` }}>
+        {full > 0 && (
+          <>
+            {props.cloud && (
+              <canvas ref={canvas} class={props.onPick ? "cloud pick" : "cloud"} aria-hidden="true" onClick={(event) => { const point = at(event); if (point >= 0) props.onPick?.(point); }}
+                onMouseMove={props.describe ? move : undefined} onMouseLeave={() => setHover("")}
+                style={{ left: `${margin.left}px`, top: `${margin.top}px`, width: `${width}px`, height: `${height}px` }} />
+            )}
+            <svg ref={svg} width={full} height={props.height} viewBox={`0 0 ${full} ${props.height}`} role="img" aria-label={props.label}>
+              <g transform={`translate(${margin.left} ${margin.top})`}>
+                {yTicks.map((y) => <line x1="0" x2={width} y1={frame.y(y)} y2={frame.y(y)} stroke={y === 0 ? "var(--axis)" : "var(--grid)"} />)}
+                {!props.x.labels && xTicks.map((x) => <line y1="0" y2={height} x1={frame.x(x)} x2={frame.x(x)} stroke="var(--grid)" />)}
+                {props.marks.map((mark) => <MarkShape mark={mark} frame={frame} />)}
+                <g fill="var(--soft)" font-size="11.5">
+                  {yTicks.map((y) => <text x="-8" y={frame.y(y) + 4} text-anchor="end">{tickText(y)}</text>)}
+                  {xTicks.map((x) => <text x={frame.x(x)} y={height + 17} text-anchor="middle">{props.x.labels ? props.x.labels[x] : tickText(x)}</text>)}
+                </g>
+                <g fill="var(--soft)" font-size="12">
+                  <text x={width} y={height + 34} text-anchor="end">{props.x.title}</text>
+                  <text text-anchor="middle" transform={`translate(${12 - margin.left} ${height / 2}) rotate(-90)`}>{props.y.title}</text>
+                </g>
+              </g>
+            </svg>
+          </>
+        )}
+        {hover && <div class="hover" role="status">{hover}</div>}
+      </div>
+      {props.caption && <figcaption>{props.caption}</figcaption>}
+    </figure>
+  );
+}

@@ -1,0 +1,25 @@
+import { render } from "preact";
+import { App } from "./app";
+import { FileSource } from "./data/load";
+import { followHash, page, session, touchEntries } from "./state";
+import "./style.css";
+
+const place = document.getElementById("page")!;
+
+async function start(): Promise<void> {
+  try {
+    page.value = await new FileSource().load();
+  } catch (reason) {
+    place.replaceChildren();
+    render(<main><h1>This report cannot be read</h1><p role="alert">{reason instanceof Error ? reason.message : String(reason)}</p><p>Make it anew: touchstone diagnose --html FILE.</p></main>, place);
+    return;
+  }
+  const name = page.value.report.model_name;
+  document.title = name ? `Touchstone report: ${name}` : "Touchstone report";
+  session.value = touchEntries.value[0]?.index ?? 0;
+  followHash();
+  place.replaceChildren();
+  render(<App />, place);
+}
+
+void start();

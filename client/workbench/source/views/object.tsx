@@ -1,0 +1,224 @@
+// The object: its mesh with the residuals painted on, every contact, the selected touch with its fingers, the next touches.
+import { useEffect, useRef, useState } from "preact/hooks";
+import { css, diverging, isDark, rgbOf } from "../colour";
+import { tickText } from "../charts/scale";
+import { Tools } from "../parts/tools";
+import { count, error, isPictures, unitFor } from "../format";
+import { paint, refined } from "../object/paint";
+import { movingPoints, ObjectScene, type Rod } from "../object/scene";
+import { entry, improved, limit as colourScale, object, page, selectTouch, shown, theme, touchIndex, touches, walk } from "../state";
+import type { Touches } from "../data/touches";
+import type { DataReport } from "../data/report";
+import { describeCell } from "./compare";
+
+// Of the object that is shown: cells of the table, in the order of the dots.
+function cellsOf(table: Touches, name: string): number[] {
+  const wanted = table.objects.indexOf(name);
+  const list: number[] = [];
+  for (let cell = 0; cell < table.cells; ++cell) if (table.object[table.touchOf(cell)] === wanted && !Number.isNaN(table.residual[cell])) list.push(cell);
+  return list;
+}
+
+function contactsOf(table: Touches, cells: number[]): Float32Array {
+  const positions = new Float32Array(3 * cells.length);
+  cells.forEach((cell, i) => { for (let k = 0; k < 3; ++k) positions[3 * i + k] = table.contact[3 * cell + k]; });
+  return positions;
+}
+
+function objectToShow(table: Touches, data: DataReport): string {
+  if (object.value !== null) return object.value;
+  if (touchIndex.value !== null) return table.objects[table.object[touchIndex.value]];
+  const groups = data.groups.filter((group) => group.kind === "OBJECT").sort((a, b) => b.share_of_excess_error - a.share_of_excess_error);
+  return groups[0]?.name ?? table.objects[0] ?? "";
+}
+
+function Scale({ limit, data }: { limit: number; data: DataReport }) {
+  const unit = unitFor(data.kind, limit);
+  const steps = 41;
+  const x = (value: number) => 10 + 140 * (value / limit + 1);
+  const floor = data.noise_floor;
+  return (
+    <svg class="colour-scale" viewBox="0 0 300 52" role="img" aria-label={`Colours: blue ${error(data.kind, limit)} earlier than simulated, grey none, orange later`}>
+      {Array.from({ length: steps }, (_, i) => <rect x={10 + (280 * i) / steps} y="4" width={280 / steps + 0.5} height="12" fill={css(diverging((2 * i) / (steps - 1) - 1))} />)}
+      {floor > 0 && floor < limit && [-floor, floor].map((value) => <line x1={x(value)} x2={x(value)} y1="1" y2="19" stroke="var(--ink)" stroke-width="1.5" />)}
+      <g fill="var(--soft)" font-size="11" text-anchor="middle">
+        {[-limit, 0, limit].map((value) => <text x={Math.min(278, Math.max(22, x(value)))} y="31">{value > 0 ? "+" : ""}{tickText(Number((value * unit.factor).toPrecision(3)))}</text>)}
+        <text x="10" y="46" text-anchor="start">earlier</text><text x="150" y="46">residual ({unit.symbol}){floor > 0 && floor < limit ? "; bars: noise floor" : ""}</text><text x="290" y="46" text-anchor="end">later</text>
+      </g>
+    </svg>
+  );
+}
+
+// A length that is round and at most 110 px.
+function scaleBar(pixelsPerMm: number): { mm: number; px: number } {
+  const most = 110 / pixelsPerMm;
+  const power = 10 ** Math.floor(Math.log10(most));
+  const mm = ([5, 2, 1].find((round) => round * power <= most) ?? 1) * power;
+  return { mm, px: mm * pixelsPerMm };
+}
+
+function Overlay({ scene, labels }: { scene: ObjectScene; labels: { at: number[]; text: string }[] }) {
+  const [, redraw] = useState(0);
+  useEffect(() => { scene.onDraw = () => redraw((n) => n + 1); redraw(1); }, [scene]);
+  const { clientWidth: width, clientHeight: height } = scene.canvas;
+  const origin = scene.project(0, 0, 0);
+  const bar = scaleBar(scene.pixelsPerMm());
+  const axis = (k: number) => {
+    const tip = scene.project(k === 0 ? 1 : 0, k === 1 ? 1 : 0, k === 2 ? 1 : 0);
+    const factor = 30 / scene.pixelsPerMm();
+    return [(tip.x - origin.x) * factor, (tip.y - origin.y) * factor];
+  };
+  if (!Number.isFinite(bar.px) || !width) return null;
+  return (
+    <svg class="overlay" viewBox={`0 0 ${width} ${height}`} aria-hidden="true">
+      <g transform={`translate(44 ${height - 44})`}>
+        {["x", "y", "z"].map((name, k) => { const [x, y] = axis(k); return <><line x2={x} y2={y} stroke="var(--ink)" stroke-width="1.6" /><text x={x * 1.28} y={y * 1.28 + 4} text-anchor="middle" font-size="12" fill="var(--ink)">{name}</text></>; })}
+      </g>
+      <g transform={`translate(${width - 14} ${height - 16})`}>
+        <path d={`M${-bar.px} -5V0H0V-5`} fill="none" stroke="var(--ink)" stroke-width="1.6" /><text x={-bar.px / 2} y="-7" text-anchor="middle" font-size="12" fill="var(--ink)">{tickText(Number(bar.mm.toPrecision(3)))} mm</text>
+      </g>
+      {labels.map(({ at, text }) => { const p = scene.project(at[0], at[1], at[2]); return <text x={p.x} y={p.y} font-size="13" font-weight="700" text-anchor="middle" fill="var(--ink)" paint-order="stroke" stroke="var(--paper)" stroke-width="3">{text}</text>; })}
+    </svg>
+  );
+}
+
+const along = (from: number[], direction: number[], length: number) => from.map((x, k) => x + length * direction[k]);
+
+function touchRods(table: Touches, n: number, size: number, limit: number): Rod[] {
+  const approach = [0, 1, 2].map((k) => table.approach[3 * n + k]);
+  const values = table.residuals(improved.value);
+  return table.cellsOf(n).flatMap((cell): Rod[] => {
+    const contact = [0, 1, 2].map((k) => table.contact[3 * cell + k]);
+    if (contact.some(Number.isNaN)) return [];
+    return [{ from: along(contact, approach, -0.42 * size), to: contact, colour: rgbOf(`--f${table.fingerOf(cell) % 6}`), width: 0.009 * size, tip: "ball", tipColour: diverging(values[cell] / limit) }];
+  });
+}
+
+export function ObjectView() {
+  const table = touches.value;
+  const data = entry.value?.data;
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const svg = useRef<HTMLDivElement>(null);
+  const [scene, setScene] = useState<ObjectScene | null>(null);
+  const [failed, setFailed] = useState("");
+  const [painted, setPainted] = useState(true);
+  const [hover, setHover] = useState("");
+  const name = table && data ? objectToShow(table, data) : "";
+  const limit = colourScale.value;
+  const cells = useRef<{ of: string; table: Touches | null; list: number[] }>({ of: "", table: null, list: [] });
+  if (table && (cells.current.of !== name || cells.current.table !== table)) cells.current = { of: name, table, list: cellsOf(table, name) };
+  const list = cells.current.list;
+  const mesh = useRef<ReturnType<typeof refined> | null>(null);
+
+  useEffect(() => {
+    if (!canvas.current) return;
+    let made: ObjectScene;
+    try {
+      made = new ObjectScene(canvas.current, list.length > movingPoints);
+    } catch {
+      setFailed("This browser has no WebGL, which the object needs; every other view works without it.");
+      return;
+    }
+    const observer = new ResizeObserver(() => made.resize(canvas.current!.clientWidth, canvas.current!.clientHeight));
+    observer.observe(canvas.current);
+    setScene(made);
+    return () => { observer.disconnect(); made.dispose(); };
+  }, [!table]);
+
+  useEffect(() => {
+    if (!scene || !table || !data) return;
+    const outline = data.outlines.find((one) => one.object === name);
+    mesh.current = outline ? refined(outline.vertices_mm, outline.triangles) : null;
+    scene.setMesh(mesh.current, contactsOf(table, list));
+  }, [scene, table, name]);
+
+  const mask = shown.value;
+  const night = isDark();
+  useEffect(() => {
+    if (!scene || !table) return;
+    const values = table.residuals(improved.value);
+    const positions = contactsOf(table, list);
+    const palette = Array.from({ length: 256 }, (_, i) => diverging(i / 127.5 - 1, night));
+    const tone = (value: number) => palette[Math.min(255, Math.max(0, Math.round(127.5 * (value / limit + 1))))] ?? palette[128];
+    const colours = new Uint8Array(3 * list.length);
+    const seen = new Uint8Array(list.length);
+    list.forEach((cell, i) => {
+      colours.set(tone(values[cell]), 3 * i);
+      seen[i] = mask[cell];
+    });
+    scene.setContacts({ positions, colours, shown: seen });
+    if (mesh.current) {
+      const solid = rgbOf("--solid");
+      const known = list.filter((cell) => mask[cell] && !Number.isNaN(values[cell]) && !Number.isNaN(table.contact[3 * cell]));
+      const from = painted ? known : [];
+      scene.paint(paint(mesh.current, contactsOf(table, from), Float32Array.from(from, (cell) => values[cell]), 0.055 * scene.size, solid, tone));
+    }
+  }, [scene, table, name, mask, improved.value, night, painted, theme.value]);
+
+  const next = page.value!.report.next.map((one, i) => ({ one, i })).filter(({ one }) => one.touch && one.object === name);
+  const arrows = scene ? next.map(({ one, i }) => {
+    const target = [one.touch!.target_m.x, one.touch!.target_m.y, one.touch!.target_m.z].map((x) => 1000 * x);
+    const approach = [one.touch!.approach.x, one.touch!.approach.y, one.touch!.approach.z];
+    const out = along(target, approach, -0.5 * scene.size);
+    return { from: along(out, approach, -0.16 * scene.size), to: out, label: along(out, approach, -0.2 * scene.size), text: String(i + 1) };
+  }) : [];
+  useEffect(() => {
+    if (!scene || !table) return;
+    const onIt = touchIndex.value !== null && table.objects[table.object[touchIndex.value]] === name;
+    scene.setRods([...(onIt ? touchRods(table, touchIndex.value!, scene.size, limit) : []), ...arrows.map(({ from, to }): Rod => ({ from, to, colour: rgbOf("--next"), width: 0.007 * scene.size, tip: "cone" }))]);
+  }, [scene, table, name, touchIndex.value, improved.value, theme.value, night]);
+
+  if (!table || !data || isPictures(data.kind)) return null;
+  const place = (event: PointerEvent | MouseEvent): [number, number] => { const box = canvas.current!.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
+  const down = (event: PointerEvent) => { drag.current = { held: [event.clientX, event.clientY], moved: 0 }; canvas.current!.setPointerCapture(event.pointerId); scene?.hold(true); };
+  const move = (event: PointerEvent) => {
+    if (!scene) return;
+    const now = drag.current;
+    if (now.held) {
+      const [dx, dy] = [event.clientX - now.held[0], event.clientY - now.held[1]];
+      now.moved += Math.abs(dx) + Math.abs(dy);
+      now.held = [event.clientX, event.clientY];
+      scene.turn(dx * 0.009, dy * 0.009);
+    } else {
+      const at = scene.pick(...place(event));
+      setHover(at >= 0 ? describeCell(table, data.kind, list[at]) : "");
+    }
+  };
+  const up = (event: PointerEvent) => {
+    const moved = drag.current.moved;
+    drag.current = { held: null, moved: 0 };
+    scene?.hold(false);
+    if (moved > 4 || !scene) return;
+    const at = scene.pick(...place(event));
+    selectTouch(at >= 0 ? table.touchOf(list[at]) : null);
+  };
+  const keys: Record<string, () => void> = {
+    ArrowLeft: () => scene?.turn(0.12, 0), ArrowRight: () => scene?.turn(-0.12, 0), ArrowUp: () => scene?.turn(0, 0.12), ArrowDown: () => scene?.turn(0, -0.12),
+    "+": () => scene?.zoom(1.2), "=": () => scene?.zoom(1.2), "-": () => scene?.zoom(1 / 1.2), Enter: () => walk(1),
+  };
+  return (
+    <figure class="object-view">
+      <div class="plot-head">
+        <div class="plot-title"><b>{name}</b> <span class="soft">{count(list.length)} contacts</span></div>
+        <label class="check"><input type="checkbox" checked={painted} onChange={(event) => setPainted(event.currentTarget.checked)} /> paint</label>
+        <Tools title={`Residuals on ${name}`} svg={() => svg.current?.querySelector("svg") ?? null} under={() => `<image width="${canvas.current!.clientWidth}" height="${canvas.current!.clientHeight}" href="${scene?.picture()}"/>`}
+          rows={() => [["touch", "finger", "x_mm", "y_mm", "z_mm", `residual_${data.unit}`, `after_${data.unit}`], ...list.filter((cell) => mask[cell]).map((cell) => [table.number[table.touchOf(cell)], table.names[table.fingerOf(cell)], table.contact[3 * cell], table.contact[3 * cell + 1], table.contact[3 * cell + 2], table.residual[cell], table.after[cell]])]} />
+      </div>
+      <div class="stage" ref={svg}>
+        {failed ? <p class="empty">{failed}</p> : (
+          <canvas ref={canvas} tabIndex={0} role="application" aria-label={`Residuals on ${name}. Arrow keys turn it, plus and minus zoom, Enter goes to the next touch, the worst first.`}
+            onPointerDown={down} onPointerMove={move} onPointerUp={up} onPointerCancel={() => { drag.current = { held: null, moved: 0 }; scene?.hold(false); }} onPointerLeave={() => setHover("")}
+            onWheel={(event) => { if (event.ctrlKey) { event.preventDefault(); scene?.zoom(event.deltaY < 0 ? 1.1 : 1 / 1.1); } }}
+            onKeyDown={(event) => { const act = keys[event.key]; if (act && !event.ctrlKey) { event.preventDefault(); act(); } }} />
+        )}
+        {scene && <Overlay scene={scene} labels={arrows.map(({ label, text }) => ({ at: label, text }))} />}
+        <span class="zoom"><button type="button" aria-label="Nearer" onClick={() => scene?.zoom(1.25)}>+</button><button type="button" aria-label="Farther" onClick={() => scene?.zoom(1 / 1.25)}>−</button></span>
+        {hover && <div class="hover" role="status">{hover}</div>}
+      </div>
+      <figcaption><Scale limit={limit} data={data} /><span>Each dot is one finger&rsquo;s contact, where the given model puts it; between them their mean is painted.{list.length > movingPoints && ` While it turns, an even sample of ${count(movingPoints)} is drawn.`}{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
+    </figure>
+  );
+}
+
+// Between two events of a pointer the view may be drawn anew.
+const drag: { current: { held: [number, number] | null; moved: number } } = { current: { held: null, moved: 0 } };

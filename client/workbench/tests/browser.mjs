@@ -1,0 +1,179 @@
+// The page in Debian's chromium: what a person does, and what they see. Screenshots in $TOUCHSTONE_SHOTS, if set.
+import { readFileSync } from "node:fs";
+import { after, before, test } from "node:test";
+import assert from "node:assert/strict";
+import { join } from "node:path";
+import { executable, hasChromium, launch } from "./chromium.mjs";
+import { pageOf, sample } from "./pages.mjs";
+
+const shots = process.env.TOUCHSTONE_SHOTS;
+const axe = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
+const touches = sample("touches");
+const photographs = sample("photographs");
+let browser;
+
+before(async () => {
+  assert.ok(hasChromium(), `there is no ${executable}: deploy/setup installs chromium, or name another one in CHROMIUM`);
+  browser = await launch();
+});
+after(() => browser?.close());
+
+// Opens it; at the end nothing may have been said on the console, and nothing fetched.
+async function opened(data, act, { width = 1280, height = 800, scheme = "light", hash = "", name = "page" } = {}) {
+  const page = await browser.newPage({ viewport: { width, height }, colorScheme: scheme, reducedMotion: "reduce" });
+  const said = [];
+  const fetched = [];
+  page.on("console", (message) => { if (message.type() !== "log" && !/GPU stall|swiftshader/i.test(message.text())) said.push(message.text()); });
+  page.on("pageerror", (error) => said.push(error.stack));
+  page.on("request", (request) => { if (/^(https?|wss?):/.test(request.url())) fetched.push(request.url()); });
+  page.on("dialog", (dialog) => { said.push(`dialog: ${dialog.message()}`); void dialog.dismiss(); });
+  try {
+    await page.goto(pageOf(data, name) + hash);
+    await page.waitForSelector("h1");
+    await act(page);
+    if (shots) await page.screenshot({ path: join(shots, `${name}.png`), fullPage: true });
+    assert.deepEqual(said, []);
+    assert.deepEqual(fetched, []);
+  } finally {
+    await page.close();
+  }
+}
+
+const shownCount = (page) => page.locator("[data-shown]").getAttribute("data-shown").then(Number);
+
+async function violations(page) {
+  await page.evaluate(axe);
+  const found = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
+  return found.violations.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 140)).slice(0, 3).join(" | ")}`);
+}
+
+test("the verdict is the first that is read, with the errors and the floor", async () => {
+  await opened(touches, async (page) => {
+    assert.equal(await page.locator("[data-verdict]").getAttribute("data-verdict"), touches.report.verdict);
+    assert.match(await page.locator("h1").innerText(), /tip_radius/);
+    assert.equal(await page.locator("h1").count(), 1);
+    assert.equal(await page.locator(".rung").count(), touches.words.ladder.length);
+  }, { name: "verdict" });
+});
+
+test("a click on a slice filters touches, object and plot, and the address says so", async () => {
+  await opened(touches, async (page) => {
+    assert.equal(await shownCount(page), touches.report.data[0].count);
+    await page.locator("button.slice").first().click();
+    await page.waitForFunction(() => location.hash.includes("slice=0"));
+    assert.equal(await shownCount(page), touches.report.data[0].where[0].count);
+    await page.getByRole("button", { name: /Remove the filter/ }).click();
+    assert.equal(await shownCount(page), touches.report.data[0].count);
+  }, { name: "slice" });
+});
+
+test("an address brings back what was selected", async () => {
+  const touch = touches.report.data[0].worst_touches[0].touch;
+  await opened(touches, async (page) => {
+    await page.waitForSelector(`[data-touch="${touch}"]`);
+    assert.equal(await page.locator(".filters select").first().inputValue(), touches.report.data[0].worst_touches[0].object);
+    assert.equal(await page.getByRole("button", { name: "improved", exact: true }).getAttribute("aria-pressed"), "true");
+  }, { hash: `#touch=${touch}&object=${touches.report.data[0].worst_touches[0].object}&model=improved`, name: "address" });
+});
+
+test("a click on a contact of the object selects its touch in the plot", async () => {
+  await opened(touches, async (page) => {
+    const canvas = page.locator(".stage canvas");
+    await canvas.scrollIntoViewIfNeeded();
+    await page.waitForSelector(".overlay");
+    const box = await canvas.boundingBox();
+    // Wherever the mouse finds a contact, which the page then names.
+    let found = false;
+    for (let y = 0.3; y < 0.75 && !found; y += 0.03) {
+      for (let x = 0.3; x < 0.7 && !found; x += 0.015) {
+        await page.mouse.move(box.x + x * box.width, box.y + y * box.height);
+        if (await page.locator(".stage .hover").count()) {
+          const name = await page.locator(".stage .hover").innerText();
+          await page.mouse.down();
+          await page.mouse.up();
+          const number = name.match(/^touch (\d+)/)[1];
+          await page.waitForSelector(`[data-touch="${number}"]`);
+          assert.match(await page.evaluate(() => location.hash), new RegExp(`touch=${number}`));
+          found = true;
+        }
+      }
+    }
+    assert.ok(found, "no contact under the mouse");
+  }, { name: "contact" });
+});
+
+test("keys go through the touches, the worst first", async () => {
+  await opened(touches, async (page) => {
+    await page.keyboard.press("]");
+    await page.waitForSelector(`[data-touch="${touches.report.data[0].worst_touches[0].touch}"]`);
+    await page.keyboard.press("Escape");
+    assert.equal(await page.locator("[data-touch]").count(), 0);
+  }, { name: "keys" });
+});
+
+test("a step of the ladder shows what it is", async () => {
+  await opened(touches, async (page) => {
+    await page.locator(".rung.step button").first().click();
+    assert.equal(await page.locator("#step-0.chosen").count(), 1);
+  }, { name: "step" });
+});
+
+test("a report pinned as the baseline shows differences first and folds what is equal", async () => {
+  const other = structuredClone(touches);
+  other.report.data[0].initial.rmse *= 2;
+  await opened(touches, async (page) => {
+    await page.setInputFiles("input[type=file]", { name: "other.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify(other.report)) });
+    await page.waitForSelector("text=Differences");
+    const rows = page.locator("#baseline figure").first().locator("tbody tr");
+    assert.equal(await rows.count(), 1);
+    assert.match(await rows.first().innerText(), /given model/);
+    await page.setInputFiles("input[type=file]", { name: "no.json", mimeType: "application/json", buffer: Buffer.from("{}") });
+    await page.waitForSelector("#baseline [role=alert]");
+  }, { name: "baseline" });
+});
+
+test("photographs stand beside what was rendered and what is left", async () => {
+  await opened(photographs, async (page) => {
+    const images = page.locator("#photographs img");
+    assert.equal(await images.count(), photographs.report.data[0].photographs.maps.length * 5);
+    assert.ok(await images.first().evaluate((image) => image.complete && image.naturalWidth > 0));
+  }, { name: "photographs" });
+});
+
+test("names of people are text, wherever they stand", async () => {
+  const evil = "</script><img src=x onerror=alert(1)><script>alert(2)</script>\"'";
+  const data = structuredClone(touches);
+  const put = (value) => {
+    for (const key of Object.keys(value)) {
+      if (typeof value[key] === "string" && ["name", "object", "effect", "session", "words", "slice", "meaning", "model_name", "summary", "title", "covariate", "headline", "note"].includes(key)) value[key] = evil;
+      else if (key === "objects" || key === "fingers" || key === "warnings") { if (Array.isArray(value[key])) value[key] = value[key].map((one) => (typeof one === "string" ? evil : one)); }
+      else if (value[key] && typeof value[key] === "object") put(value[key]);
+    }
+  };
+  put(data);
+  await opened(data, async (page) => {
+    assert.equal(await page.locator("img").count(), 0);
+    assert.equal(await page.locator("script").count(), 2);
+    assert.match(await page.locator("h1").innerText(), /<img src=x/);
+  }, { name: "hostile" });
+});
+
+test("data that are cut off, and a report of nothing, are said in words", async () => {
+  await opened({}, async (page) => { assert.match(await page.locator("[role=alert]").innerText(), /no report/); }, { name: "broken" });
+  const nothing = { report: { ...touches.report, verdict: "VERDICT_UNSPECIFIED", data: [], steps: [], refitted: [], warnings: [], improved_model_yaml: "" },
+    words: { ...touches.words, headline: "Nothing could be compared.", ladder: [], commands: [], of_data: [], main: undefined } };
+  await opened(nothing, async (page) => { assert.match(await page.locator("h1").innerText(), /Nothing/); }, { name: "nothing" });
+});
+
+test("a phone shows all of it without scrolling sideways", async () => {
+  for (const [data, name] of [[touches, "phone"], [photographs, "phone-photographs"]])
+    await opened(data, async (page) => {
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
+    }, { width: 390, height: 844, name });
+});
+
+test("axe finds nothing, in light and in dark", async () => {
+  for (const scheme of ["light", "dark"])
+    for (const [data, name] of [[touches, "touches"], [photographs, "photographs"]])
+      await opened(data, async (page) => { assert.deepEqual(await violations(page), []); }, { scheme, name: `${name}-${scheme}`, hash: data === touches ? "#touch=5" : "" });
+});
