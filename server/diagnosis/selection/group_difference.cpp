@@ -22,6 +22,7 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kDifferenceP = 1e-5;  // by chance, over all that is tried
+constexpr double kStretchP = 1e-8;     // ... of a stretch: scatter that moves all fingers together gave 2e-6
 constexpr double kAheadNats = 6;       // of what else explains what repeats differ by
 constexpr double kSameNats = 3;        // explanations as near as this are named together
 constexpr double kMinRepeatDegrees = 40;
@@ -122,7 +123,7 @@ class DifferenceSearch {
       if (all.empty() || all[0].gain_nats < kAheadNats) return std::nullopt;
     }
     const double p = ChanceOf(all[0]);
-    if (p > kDifferenceP) return std::nullopt;
+    if (p > (parts_[all[0].part].of_rounds ? kDifferenceP : kStretchP)) return std::nullopt;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool otherwise, SomethingElse(all[0]));
     if (otherwise) return std::nullopt;
     return Describe(all, p);
@@ -215,25 +216,37 @@ class DifferenceSearch {
     return tried;
   }
 
-  // P of such a difference by chance, over all that was tried: the F test, its ratio over what touches of each pose in other orders give: noise that grows on slopes or has tails
-  // stays with its poses.
+  // P of such a difference by chance, over all that was tried. Touches of each pose in other orders give what the columns
+  // explain of mere scatter: noise that grows on slopes, has tails or moves all fingers together stays with its poses. The
+  // degrees of freedom are those that its mean and variance have (Satterthwaite).
   double ChanceOf(const Difference& d) const {
     const Eigen::MatrixXd columns = ColumnsOf(d);
     const double rest = residuals_.squaredNorm() - d.explained, dof = repeats_.degrees() - d.values;
     if (!(dof > 0) || !(rest > 0)) return 1;
-    const double noise = std::max(rest / dof, ExplainedInOtherOrders(columns) / d.values);
-    return std::min(1.0, FisherTail(d.explained / d.values / noise, d.values, dof) * tries_);
+    const Scatter scatter = ExplainedInOtherOrders(columns);
+    const double mean = std::max(scatter.mean, d.values * rest / dof);
+    const double effective =
+        scatter.variance > 0
+            ? std::clamp(2 * scatter.mean * scatter.mean / scatter.variance, 1.0, 1.0 * d.values)
+            : 1;
+    return std::min(1.0, FisherTail(d.explained / mean, effective, dof) * tries_);
   }
 
-  // The mean square that the columns explain of what they leave once touches have changed places.
-  double ExplainedInOtherOrders(const Eigen::MatrixXd& columns) const {
+  // Of the squares that the columns explain of what they leave once touches have changed places.
+  struct Scatter {
+    double mean = 0, variance = 0;
+  };
+  Scatter ExplainedInOtherOrders(const Eigen::MatrixXd& columns) const {
     const Eigen::MatrixXd basis = ColumnSpan(columns).Basis();
     const Eigen::VectorXd left = residuals_ - basis * (basis.transpose() * residuals_);
     RandomStream random(workspace_.input.seed, RandomDomain::kDiagnosis);
-    double sum = 0;
-    for (int n = 0; n < kOrders; ++n)
-      sum += (basis.transpose() * repeats_.Shuffled(left, &random)).squaredNorm();
-    return sum / kOrders;
+    double sum = 0, sum2 = 0;
+    for (int n = 0; n < kOrders; ++n) {
+      const double explained = (basis.transpose() * repeats_.Shuffled(left, &random)).squaredNorm();
+      sum += explained, sum2 += explained * explained;
+    }
+    const double mean = sum / kOrders;
+    return {mean, (sum2 - sum * mean) / (kOrders - 1)};
   }
 
   // An object that lay elsewhere in every round, or what changes slowly: a part is not the whole of it.

@@ -15,6 +15,7 @@
 #include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/dropouts.h"
+#include "server/diagnosis/selection/pose_scatter.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/session_order.h"
 #include "server/diagnosis/selection/surface_step.h"
@@ -22,6 +23,7 @@
 #include "server/diagnosis/selection/touches_set_aside.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/ticks.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -31,6 +33,7 @@ constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says 
 constexpr double kMisfitP = 1e-2;
 constexpr double kRoundsPossibleP =
     0.05;  // of agreement within rounds, for a doubt of what scatter looks like
+constexpr double kMaxBesideMotion = 0.5;  // probability of noise where an object that moves would look alike
 constexpr double kMaxAtTwoSpeeds =
     0.5;  // probability of either of two effects that two speeds cannot tell from another
 constexpr double kSameSurface =
@@ -107,14 +110,12 @@ class LadderBuilder {
     if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
     // Where the object lay elsewhere in every round, what the scatter looks like is no property of the sensor.
     const size_t steps = ladder_.steps.size();
-    if (!doubts_.remounted && !selection_.partial && !ladder_.noise_floor.is_rounding)
+    if (!selection_.memory && !doubts_.remounted && !selection_.partial)
+      pose_scatter_ =
+          FindPoseScatter(*workspace_.observations, ladder_.prediction, ladder_.residuals, selection_.noise);
+    if (!doubts_.remounted && !selection_.partial && !ladder_.noise_floor.is_rounding && !PlayRemains())
       AddNoiseSteps(selection_.noise, selection_.memory.has_value(), &ladder_);
-    if (rounds_.p < kRoundsPossibleP)
-      for (size_t j = steps; j < ladder_.steps.size(); ++j) {
-        ladder_.steps[j].probability = std::min(ladder_.steps[j].probability, 0.5);
-        ladder_.steps[j].words =
-            "Repeats agree within rounds: an object put down anew each round would look alike.";
-      }
+    QuestionNoise(steps);
     if (!selection_.memory && !doubts_.remounted) RemoveAbsentMemory(*workspace_.observations, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(
         ladder_.candidates,
@@ -124,7 +125,7 @@ class LadderBuilder {
                                }));
     const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
                       selection_.partial || unplaced_ || doubts_.any() || ladder_.set_aside.is_finding ||
-                      ticks_.in_part() || selection_.group;
+                      ticks_.in_part() || selection_.group || PlayRemains();
     if (has_formula() || rest) {
       TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
                                   DescribeUnexplained(workspace_, selection_, ladder_.final,
@@ -299,6 +300,24 @@ class LadderBuilder {
     doubts_.words = RoundsInWords(rounds_, sigma_s);
   }
 
+  // Of the noise, from step `first` on, what an object that moves would look like.
+  void QuestionNoise(size_t first) {
+    for (size_t j = first; j < ladder_.steps.size(); ++j) {
+      engine::LadderStep& step = ladder_.steps[j];
+      if (rounds_.p < kRoundsPossibleP) {
+        step.probability = std::min(step.probability, kMaxBesideMotion);
+        step.words = "Repeats agree within rounds: an object put down anew each round would look alike.";
+      }
+      const auto level = effects::FindByRole(model::EffectRole::kNoiseLevel);
+      if (!pose_scatter_ || step.effect == level->name) continue;
+      step.probability = std::min(step.probability, kMaxBesideMotion);
+      engine::AddWords(pose_scatter_->words, &step);
+    }
+  }
+
+  // Repeats scatter as no noise of the fingers does.
+  bool PlayRemains() const { return pose_scatter_ && pose_scatter_->ahead; }
+
   bool StructureRemains() const {
     // Under a wander repeats are alike by chance, and the test of their scatter does not hold.
     return !has_formula() && !selection_.memory && engine::StructureRemains(left_, ladder_.noise_floor.sigma);
@@ -324,6 +343,7 @@ class LadderBuilder {
                               : doubts_.any()                ? doubts_.words
                               : ladder_.set_aside.is_finding ? ladder_.set_aside.words
                               : ticks_.in_part()             ? TicksInWords()
+                              : PlayRemains()                ? pose_scatter_->words
                                                              : "";
     if (!selection_.curve || selection_.curve->words.empty()) return words;
     std::string course = absl::StrCat(selection_.curve->words, ".");
@@ -360,6 +380,7 @@ class LadderBuilder {
   Doubts doubts_;
   RoundStructure rounds_;
   SurfaceSupport support_;
+  std::optional<PoseScatter> pose_scatter_;
   touches::TouchTicks ticks_;
   bool unplaced_ = false;  // a misfit repeats with the pose, but not with the place on the surface
   Ladder ladder_;

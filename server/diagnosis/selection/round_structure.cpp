@@ -11,17 +11,16 @@
 #include "server/base/random.h"
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/pose_columns.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kMaxRounds = 40;
-constexpr int kPoseValues = 6;
 constexpr double kRoundP = 1e-6;
 constexpr double kPermutedBelowP = 0.01;
 constexpr int kPermutations = 199;
 constexpr double kNegligibleRounds = 0.015;  // share of the floor
-constexpr double kMinCosine = 0.1;           // beyond, a contact's place is no function of the pose
 constexpr double kMinRoundDegrees = 8;
 
 // The touches of one object with all their fingers, each with its pose and round.
@@ -30,23 +29,12 @@ struct ObjectRounds {
   int rounds = 0;
 };
 
-bool IsComplete(const touches::Observations& o, const touches::Prediction& d,
-                const std::vector<double>& residuals, int k) {
-  for (int i = 0; i < o.fingers; ++i) {
-    const size_t e = static_cast<size_t>(k) * o.fingers + i;
-    if (!std::isfinite(residuals[e]) || !d.contact_m[e].allFinite() || !d.normal[e].allFinite() ||
-        !std::isfinite(d.inverse_speed_s_per_m[e]) || !(d.cos_incidence[e] > kMinCosine))
-      return false;
-  }
-  return true;
-}
-
 std::vector<ObjectRounds> RoundsOf(const touches::Observations& o, const touches::Prediction& d,
                                    const std::vector<double>& residuals) {
   std::vector<ObjectRounds> objects(o.objects.size());
   std::vector<std::map<int, int>> numbers(o.objects.size());
   for (int k = 0; k < o.size(); ++k) {
-    if (!o.used[k] || !IsComplete(o, d, residuals, k)) continue;
+    if (!o.used[k] || !HasPoseColumns(o, d, residuals, k)) continue;
     ObjectRounds& object = objects[o.object[k]];
     std::map<int, int>& seen = numbers[o.object[k]];
     object.touch.push_back(k);
@@ -55,20 +43,6 @@ std::vector<ObjectRounds> RoundsOf(const touches::Observations& o, const touches
     object.rounds = static_cast<int>(seen.size());
   }
   return objects;
-}
-
-// Change of the three fingers' times, less their mean, by a small motion of the object: a plane through the contact that
-// moves by m changes the travel by n.m / n.a. Columns: translation x, y, z, rotation about x, y, z.
-Eigen::MatrixXd PoseColumns(const touches::Observations& o, const touches::Prediction& d, int k) {
-  Eigen::MatrixXd columns(o.fingers, kPoseValues);
-  const Eigen::Vector3d& approach = o.set->approach[o.row[k]];
-  for (int i = 0; i < o.fingers; ++i) {
-    const size_t e = static_cast<size_t>(k) * o.fingers + i;
-    const Eigen::Vector3d per_metre = d.normal[e] / d.normal[e].dot(approach) * d.inverse_speed_s_per_m[e];
-    columns.row(i) << per_metre.transpose(), d.contact_m[e].cross(per_metre).transpose();
-  }
-  columns.rowwise() -= columns.colwise().mean().eval();
-  return columns;
 }
 
 // Takes the mean over the repeats of each pose from the rows of every touch; returns how many touches are repeats.

@@ -26,6 +26,7 @@ double TravelMm(const Cause& cause, const TouchState& state) {
   const double size = cause.size * (cause.fingers.empty() ? 1 : cause.fingers[state.finger]);
   const double time_s = state.session_time_s;
   const auto here = [&] { return state.object == static_cast<int>(cause.at[0]); };
+  const auto in_its_round = [&] { return state.round == static_cast<int>(cause.at[0]); };
   switch (cause.kind) {
     case CauseKind::kSessionWave:
       return size * std::sin(2 * M_PI * time_s / cause.at[0] + cause.at[1]);
@@ -43,6 +44,10 @@ double TravelMm(const Cause& cause, const TouchState& state) {
       return here() ? size * state.tan_incidence : 0;
     case CauseKind::kPushOnOneObject:
       return here() && !state.first ? size : 0;
+    case CauseKind::kSlipInOneRound:
+      return in_its_round() ? size * state.tan_incidence : 0;
+    case CauseKind::kPushInOneRound:
+      return in_its_round() && !state.first ? size : 0;
     case CauseKind::kRemounted:
     case CauseKind::kPoseError:
     case CauseKind::kNoiseWithMemory:
@@ -103,7 +108,8 @@ std::string InWords(const Cause& cause) {
                                        "finger coupling",    "slip on one object",
                                        "push on one object", "remounted each round",
                                        "error of each pose", "noise with memory",
-                                       "random walk"};
+                                       "random walk",        "slip in one round",
+                                       "push in one round"};
   char text[32];
   std::string words = kNames[static_cast<int>(cause.kind)];
   const auto add = [&](double value) {

@@ -22,6 +22,8 @@ enum class CauseKind {
   kPoseError,        // deg of tilt along and across the row, fixed for each pose
   kNoiseWithMemory,  // us, per finger, stationary; at: correlation time in s
   kRandomWalk,       // us per square root of an hour, per finger
+  kSlipInOneRound,   // mm per tan(incidence); at: the round
+  kPushInOneRound,   // mm for every finger but the first; at: the round
 };
 
 struct Cause {
@@ -38,6 +40,7 @@ struct TouchState {
   double tan_incidence = 0;
   bool first = false;        // touches before all others
   double neighbours_mm = 0;  // travel of the left neighbour less that of the right one; 0 without both
+  int round = 0;
 };
 
 // Travel that the cause adds, mm; 0 for causes of the pose and of the noise.

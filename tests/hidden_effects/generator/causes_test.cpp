@@ -88,6 +88,18 @@ TEST(HiddenCause, OneObjectAloneSlipsOrIsPushed) {
   ExpectAdded(Added(push, Leaning(1)), 0, 0.3, 0.3);
 }
 
+TEST(HiddenCause, InOneRoundAloneObjectsSlipOrArePushed) {
+  const Cause slip{CauseKind::kSlipInOneRound, 0.5, {2}, {}}, push{CauseKind::kPushInOneRound, 0.3, {2}, {}};
+  Command command = Leaning();
+  command.round = 1;
+  ExpectAdded(Added(slip, command), 0, 0, 0);
+  ExpectAdded(Added(push, command), 0, 0, 0);
+  command.round = 2;
+  const double slid = 0.5 * std::tan(kLean);
+  ExpectAdded(Added(slip, command), slid, slid, slid);
+  ExpectAdded(Added(push, command), 0, 0.3, 0.3);
+}
+
 TEST(HiddenCause, AnObjectStandsElsewhereInEachRound) {
   const Cause remounted{CauseKind::kRemounted, 0.4, {1}, {}};
   Command command = Leaning();

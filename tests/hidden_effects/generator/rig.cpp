@@ -155,7 +155,7 @@ std::vector<double> Rig::AddedTravelMm(const std::vector<Landing>& landings, int
     state.approach = command.approach, state.lateral = command.lateral, state.contact_mm = landing.contact_mm;
     for (const Unlisted& unlisted : scenario_.unlisted)
       added[i] += unlisted.k_mm * FindUnlisted(unlisted.name).travel(state, unlisted.second);
-    TouchState touch{command.object, i, session_time_s, landing.tangent, i == first, 0};
+    TouchState touch{command.object, i, session_time_s, landing.tangent, i == first, 0, command.round};
     if (i > 0 && i + 1 < fingers && landings[i - 1].hit && landings[i + 1].hit)
       touch.neighbours_mm = landings[i - 1].travel_mm - landings[i + 1].travel_mm;
     for (const Cause& cause : scenario_.causes) added[i] += TravelMm(cause, touch);

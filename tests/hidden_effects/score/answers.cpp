@@ -23,6 +23,9 @@ std::vector<std::string> CovariatesOf(CauseKind kind) {
     case CauseKind::kSlipOnOneObject:
     case CauseKind::kPushOnOneObject:
       return {"object"};
+    case CauseKind::kSlipInOneRound:
+    case CauseKind::kPushInOneRound:
+      return {"round"};
     case CauseKind::kRemounted:
       return {"round", "session_time", "time", "touch", "place", "order", "session"};
     case CauseKind::kPoseError:
@@ -38,8 +41,10 @@ std::string NameOf(CauseKind kind) {
     case CauseKind::kRandomWalk:
       return "correlated_noise";
     case CauseKind::kSlipOnOneObject:
+    case CauseKind::kSlipInOneRound:
       return "oblique_slip";
     case CauseKind::kPushOnOneObject:
+    case CauseKind::kPushInOneRound:
       return "object_push";
     case CauseKind::kRemounted:
       return "object_pose";

@@ -76,6 +76,8 @@ bool CauseIsRight(const Scenario& truth, const v1::Report& report, const Answer&
     case CauseKind::kPushOnOneObject:
       where = {truth.objects.at(static_cast<size_t>(cause.at[0]))->name()};
       break;
+    case CauseKind::kSlipInOneRound:
+    case CauseKind::kPushInOneRound:
     case CauseKind::kRemounted:
       where = {"round", "anew"};
       break;

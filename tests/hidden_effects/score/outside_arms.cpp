@@ -122,6 +122,8 @@ std::vector<Outside> Causes() {
       {"finger coupling", Kind::kCause, WithCause(CauseKind::kFingerCoupling)},
       {"slip on one object", Kind::kCause, WithCause(CauseKind::kSlipOnOneObject)},
       {"push on one object", Kind::kCause, WithCause(CauseKind::kPushOnOneObject)},
+      {"slip in one round", Kind::kCause, WithCause(CauseKind::kSlipInOneRound)},
+      {"push in one round", Kind::kCause, WithCause(CauseKind::kPushInOneRound)},
       {"remounted each round", Kind::kCause, WithCause(CauseKind::kRemounted)},
       {"error of each pose", Kind::kCause, WithCause(CauseKind::kPoseError)},
       {"beyond its bound", Kind::kBeyondBound, BeyondItsBound},

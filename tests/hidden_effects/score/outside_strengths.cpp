@@ -66,6 +66,10 @@ Cause Shape(CauseKind kind, const Scenario& scenario, Random& random) {
       return {kind, 0.5, {object}, {}};
     case CauseKind::kPushOnOneObject:
       return {kind, 0.4, {object}, {}};
+    case CauseKind::kSlipInOneRound:
+      return {kind, 0.5, {static_cast<double>(random() % scenario.rounds)}, {}};
+    case CauseKind::kPushInOneRound:
+      return {kind, 0.4, {static_cast<double>(random() % scenario.rounds)}, {}};
     case CauseKind::kRemounted:
       return {kind, 0.3, {Uniform(0.5, 1.5, random)}, {}};
     case CauseKind::kPoseError:

@@ -1,0 +1,26 @@
+// What a small motion of the object changes of a touch.
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "server/diagnosis/touches/observations.h"
+#include "server/diagnosis/touches/prediction.h"
+
+namespace touchstone::diagnosis::selection {
+
+inline constexpr int kPoseValues = 6;
+
+// Whether every finger of touch k has a residual [k * fingers + i] and a contact whose place is a function of the pose: beyond
+// kMinCosine of incidence it is none.
+inline constexpr double kMinCosine = 0.1;
+bool HasPoseColumns(const touches::Observations& observations, const touches::Prediction& details,
+                    const std::vector<double>& residuals, int k);
+
+// Changes of the fingers' times, s, less their mean, fingers x kPoseValues: a plane through the contact that moves by m
+// changes the travel by n.m / n.a. Columns: translation along x, y, z, s/m, rotation about x, y, z, s/rad; object frame.
+Eigen::MatrixXd PoseColumns(const touches::Observations& observations, const touches::Prediction& details,
+                            int k);
+
+}  // namespace touchstone::diagnosis::selection
