@@ -71,9 +71,17 @@ std::string Compared(const v1::Report& report) {
 
 std::string Unexplained(const v1::Report& report) {
   std::string on;
-  for (const v1::DataReport& data : report.data())
-    if (on.empty() && !data.unexplained().covariates().empty())
-      on = absl::StrCat(" It depends on ", CovariateName(data.unexplained().covariates(0).name()), ".");
+  bool between_rounds = false;
+  for (const v1::DataReport& data : report.data()) {
+    if (!on.empty() || data.unexplained().covariates().empty()) continue;
+    const std::string& covariate = data.unexplained().covariates(0).name();
+    on = absl::StrCat(" It depends on ", CovariateName(covariate), ".");
+    between_rounds = covariate == "round";
+  }
+  // An effect of the catalogue may explain a part of the session.
+  if (between_rounds)
+    return absl::StrCat(report.steps().empty() ? "" : absl::StrCat("The model lacks ", Steps(report), ". "),
+                        "Something changed between the rounds of the session.");
   if (report.steps().empty()) {
     return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
   }

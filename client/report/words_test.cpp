@@ -95,6 +95,16 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "Measured and simulated touches differ as distributions (p = 0.0005).");
 }
 
+// An effect of the catalogue that acts in one round: not "in a way that no built-in effect explains".
+TEST(Headline, SaysThatRoundsDiffer) {
+  v1::Report report = UnexplainedReport();
+  report.mutable_data(0)->mutable_unexplained()->mutable_covariates(0)->set_name("round");
+  EXPECT_EQ(Headline(report), "Something changed between the rounds of the session.");
+  report.add_steps()->set_effect("tip_radius");
+  EXPECT_EQ(Headline(report),
+            "The model lacks tip_radius. Something changed between the rounds of the session.");
+}
+
 TEST(Headline, NamesWhatTheDataDoWithout) {
   v1::Report report;
   report.set_verdict(v1::Report::WRONG_VALUES);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include <absl/strings/str_cat.h>
@@ -14,6 +13,7 @@
 #include "server/base/random.h"
 #include "server/base/readable_time.h"
 #include "server/base/status.h"
+#include "server/diagnosis/selection/repeats.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/session_parts.h"
 #include "server/diagnosis/selection/time_structure.h"
@@ -33,72 +33,6 @@ constexpr double kVisible = 1e-6;   // share of a column's square that differs w
 constexpr double kClearErrors = 3;  // of a value that is worth a word
 constexpr size_t kMaxPartsNamed = 2, kMaxAlso = 3;
 
-// Residuals and columns of repeats, each less its mean over the touches of its pose.
-class Repeats {
- public:
-  explicit Repeats(const Workspace& workspace) : contrasts_(*workspace.contrasts) {
-    const touches::Observations& o = *workspace.searched;
-    std::map<std::pair<int, int>, std::vector<int>> cells;  // by pose and fingers
-    for (int t = 0; t < touches(); ++t) {
-      int fingers = 0;
-      for (int i = 0; i < o.fingers; ++i) fingers |= contrasts_.TakesPart(t, i) << i;
-      cells[{o.pose[contrasts_.touches()[t]], fingers}].push_back(t);
-    }
-    for (auto& [key, members] : cells) {
-      if (members.size() < 2) continue;
-      degrees_ += static_cast<double>((members.size() - 1) * RowsOf(members[0]));
-      cells_.push_back(std::move(members));
-    }
-  }
-
-  double degrees() const { return degrees_; }
-  int touches() const { return static_cast<int>(contrasts_.touches().size()); }
-
-  // Rows without repeats are 0.
-  Eigen::MatrixXd Centred(const Eigen::MatrixXd& rows) const {
-    Eigen::MatrixXd centred = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
-    for (const std::vector<int>& cell : cells_) {
-      const int height = RowsOf(cell[0]);
-      Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(height, rows.cols());
-      for (const int t : cell) mean += rows.middleRows(contrasts_.FirstRow(t), height) / cell.size();
-      for (const int t : cell)
-        centred.middleRows(contrasts_.FirstRow(t), height) =
-            rows.middleRows(contrasts_.FirstRow(t), height) - mean;
-    }
-    return centred;
-  }
-
-  // The rows of touches that `has` names [t], 0 elsewhere.
-  Eigen::MatrixXd Only(const Eigen::MatrixXd& rows, const std::vector<char>& has) const {
-    Eigen::MatrixXd only = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
-    for (int t = 0; t < touches(); ++t)
-      if (has[t])
-        only.middleRows(contrasts_.FirstRow(t), RowsOf(t)) =
-            rows.middleRows(contrasts_.FirstRow(t), RowsOf(t));
-    return only;
-  }
-
-  // With the touches of each pose in another order.
-  Eigen::VectorXd Shuffled(const Eigen::VectorXd& rows, RandomStream* random) const {
-    Eigen::VectorXd shuffled = rows;
-    for (const std::vector<int>& cell : cells_) {
-      std::vector<int> from = cell;
-      for (size_t left = from.size(); left > 1; --left) std::swap(from[left - 1], from[random->Below(left)]);
-      for (size_t m = 0; m < cell.size(); ++m)
-        shuffled.segment(contrasts_.FirstRow(cell[m]), RowsOf(cell[0])) =
-            rows.segment(contrasts_.FirstRow(from[m]), RowsOf(cell[0]));
-    }
-    return shuffled;
-  }
-
- private:
-  int RowsOf(int t) const { return contrasts_.FirstRow(t + 1) - contrasts_.FirstRow(t); }
-
-  const touches::Contrasts& contrasts_;
-  std::vector<std::vector<int>> cells_;
-  double degrees_ = 0;
-};
-
 // One effect in one part.
 struct Difference {
   int effect = -1, part = -1;
@@ -110,7 +44,10 @@ struct Difference {
 class DifferenceSearch {
  public:
   DifferenceSearch(const Workspace& workspace, const GivenAndEffects& columns, const SelectionResult& found)
-      : workspace_(workspace), columns_(columns), found_(found), repeats_(workspace) {}
+      : workspace_(workspace),
+        columns_(columns),
+        found_(found),
+        repeats_(*workspace.searched, *workspace.contrasts) {}
 
   absl::StatusOr<std::optional<GroupDifference>> Run() {
     if (repeats_.degrees() < kMinRepeatDegrees) return std::nullopt;
