@@ -13,6 +13,7 @@
 #include "server/base/random.h"
 #include "server/base/readable_time.h"
 #include "server/base/status.h"
+#include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/repeats.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/session_parts.h"
@@ -23,10 +24,12 @@ namespace {
 
 constexpr double kDifferenceP = 1e-5;  // by chance, over all that is tried
 constexpr double kStretchP = 1e-8;     // ... of a stretch: scatter that moves all fingers together gave 2e-6
-constexpr double kAheadNats = 6;       // of what else explains what repeats differ by
-constexpr double kSameNats = 3;        // explanations as near as this are named together
+constexpr double kRestIsMoreP =
+    1e-4;                         // of the scatter that an effect leaves in its part, over that of the others
+constexpr double kAheadNats = 6;  // of what else explains what repeats differ by
+constexpr double kSameNats = 3;   // explanations as near as this are named together
 constexpr double kMinRepeatDegrees = 40;
-constexpr double kLeastSquares = 1e-300;
+constexpr double kMinSumOfSquares = 1e-300;
 constexpr int kOrders = 199;
 constexpr int kSteps = 4;           // of Gauss and Newton
 constexpr double kVisible = 1e-6;   // share of a column's square that differs within poses
@@ -51,6 +54,9 @@ class DifferenceSearch {
 
   absl::StatusOr<std::optional<GroupDifference>> Run() {
     if (repeats_.degrees() < kMinRepeatDegrees) return std::nullopt;
+    const double given2 = repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm();
+    // What files and meshes are rounded to has a pattern, and no cause.
+    if (std::sqrt(given2 / repeats_.degrees()) < RoundingS(*workspace_.searched)) return std::nullopt;
     ListParts();
     // In the place of all that was found; else beside it, where that has a name: what a curve misses is no part.
     std::vector<Difference> all = TryAll(columns_.given);
@@ -91,7 +97,7 @@ class DifferenceSearch {
     for (Eigen::Index i = 1; i < centred.cols(); ++i)
       values += centred.col(i).squaredNorm() > kVisible * fit.columns.values.col(i).squaredNorm();
     return Nats(repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm(),
-                std::max(centred.col(0).squaredNorm(), kLeastSquares), values);
+                std::max(centred.col(0).squaredNorm(), kMinSumOfSquares), values);
   }
 
   // Of the whole explanation. Against rounds, which are known beforehand, a curve pays for each of its knots; against a stretch
@@ -142,7 +148,7 @@ class DifferenceSearch {
         const Eigen::VectorXd right = columns.transpose() * residuals_;
         d.explained = right.dot(SymmetricSolver(columns.transpose() * columns).Solve(right));
         if (!(d.explained > 0)) continue;
-        d.gain_nats = Nats(before, std::max(before - d.explained, kLeastSquares), d.values);
+        d.gain_nats = Nats(before, std::max(before - d.explained, kMinSumOfSquares), d.values);
         tried.push_back(d);
       }
     }
@@ -224,7 +230,7 @@ class DifferenceSearch {
       if (other.effect == best.effect && other.part != best.part && places.size() < kMaxPartsNamed)
         places.push_back(parts_[other.part].words);
     }
-    found.words = InWords(found, places, best, fitted.left.squaredNorm());
+    found.words = InWords(found, places, best, fitted.left);
     return found;
   }
 
@@ -283,8 +289,18 @@ class DifferenceSearch {
     return there;
   }
 
+  // Whether the touches of the part scatter more than the others under the effect that describes it.
+  bool IsMoreThan(const Difference& d, const Eigen::VectorXd& left) const {
+    const std::vector<char>& has = has_[d.part];
+    const double share = static_cast<double>(std::count(has.begin(), has.end(), 1)) / has.size();
+    const double there = repeats_.Only(left, has).squaredNorm(), elsewhere = left.squaredNorm() - there;
+    const double dof = share * repeats_.degrees() - d.values, others = (1 - share) * repeats_.degrees();
+    return dof >= 1 && elsewhere > 0 &&
+           FisherTail(there / dof / (elsewhere / others), dof, others) < kRestIsMoreP;
+  }
+
   std::string InWords(const GroupDifference& found, const std::vector<std::string>& places,
-                      const Difference& d, double left) const {
+                      const Difference& d, const Eigen::VectorXd& left) const {
     std::vector<std::string> values;
     for (const engine::ParameterEstimate& value : found.more)
       if (std::abs(value.value) > kClearErrors * value.std_error)
@@ -302,8 +318,11 @@ class DifferenceSearch {
                       " nearly the same)");
     absl::StrAppend(
         &words, ". Touches of one pose differ by ", scatter(residuals_.squaredNorm()), ", and by ",
-        scatter(left),
-        " once it is taken off. Find what changed, or measure those touches again: everything else "
+        scatter(left.squaredNorm()), " once it is taken off",
+        IsMoreThan(d, left)
+            ? "; that is not the whole of it, for those touches still differ by more than the others"
+            : "",
+        ". Find what changed, or measure those touches again: everything else "
         "here was found on the other touches.");
     if (parts_[d.part].of_rounds && workspace_.input.set->round.empty())
       absl::StrAppend(&words, " Round 0 is the first touch of each pose.");

@@ -14,8 +14,8 @@
 namespace touchstone::diagnosis::selection {
 
 // Compares touches of one pose with one another: what is the same in every touch of a pose, whether the model has it or not,
-// takes no part. `found`: the explanation without such a difference, which may explain as much (a drift, a curve of time, a
-// wander); nothing where it does, where repeats are few, and where the object lay elsewhere in every round.
+// takes no part. `found`: the explanation without such a difference, which may explain as much (a drift, a curve of time,
+// correlated noise); nothing where it does, where repeats are few, and where the object lay elsewhere in every round.
 absl::StatusOr<std::optional<GroupDifference>> FindGroupDifference(const Workspace& workspace,
                                                                    const GivenAndEffects& columns,
                                                                    const SelectionResult& found);

@@ -1,8 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/selection/selection.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -23,14 +22,6 @@ DiagnosisInput WithEffectIn(const Effects& hidden, bool (*in)(int round, int row
       for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = other.set->time_s[row * 3 + i];
   input.set = set;
   return input;
-}
-
-SelectionResult SelectionOf(const DiagnosisInput& input) {
-  auto workspace = MakeWorkspace(input, {});
-  EXPECT_TRUE(workspace.ok()) << workspace.status();
-  auto result = SelectExplanation(workspace->get());
-  EXPECT_TRUE(result.ok()) << result.status();
-  return *std::move(result);
 }
 
 bool InRound2(int round, int) {
@@ -54,7 +45,8 @@ TEST(GroupDifference, NamesTheEffectOfOneRoundWithItsValue) {
                                    {{{"tool_yaw", {"angle_deg=1"}}}, "tool_yaw", 1}};
   for (const Case& c : cases) {
     SCOPED_TRACE(c.effect);
-    const SelectionResult result = SelectionOf(WithEffectIn(c.hidden, InRound2));
+    const Selected selected = SelectFor(WithEffectIn(c.hidden, InRound2));
+    const SelectionResult& result = selected.result;
     ASSERT_TRUE(result.group.has_value());
     EXPECT_EQ(result.group->effect, c.effect);
     EXPECT_EQ(result.group->part, "in round 2");
@@ -66,8 +58,9 @@ TEST(GroupDifference, NamesTheEffectOfOneRoundWithItsValue) {
 }
 
 TEST(GroupDifference, FindsWhatChangedHalfWay) {
-  const SelectionResult result =
-      SelectionOf(WithEffectIn({{"channel_latency", {"latency_us=4000,-2000,-2000"}}}, InRounds0And1));
+  const Selected selected =
+      SelectFor(WithEffectIn({{"channel_latency", {"latency_us=4000,-2000,-2000"}}}, InRounds0And1));
+  const SelectionResult& result = selected.result;
   ASSERT_TRUE(result.group.has_value());
   EXPECT_EQ(result.group->part, "in rounds 0 and 1");
   EXPECT_THAT(
@@ -84,7 +77,7 @@ TEST(GroupDifference, IsNotClaimedWhereAnEffectActsThroughoutTheSession) {
                                        {{"incidence_noise", {"slope=1"}}},
                                        {{"correlated_noise", {"sigma_us=3000", "time_s=400"}}}};
   for (const Effects& effects : hidden)
-    EXPECT_FALSE(SelectionOf(WithEffectIn(effects, Everywhere)).group.has_value())
+    EXPECT_FALSE(SelectFor(WithEffectIn(effects, Everywhere)).result.group.has_value())
         << (effects.empty() ? "nothing" : effects[0].first);
 }
 
@@ -97,11 +90,37 @@ TEST(GroupDifference, LeavesWhatActsEverywhereElseItsName) {
     if (!InRound2(row / 24 % 4, row))
       for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = elsewhere.set->time_s[row * 3 + i];
   input.set = set;
-  const SelectionResult result = SelectionOf(input);
+  const Selected selected = SelectFor(input);
+  const SelectionResult& result = selected.result;
   ASSERT_TRUE(result.group.has_value());
   EXPECT_EQ(result.group->effect, "object_push");
   ASSERT_EQ(result.steps.size(), 1u);
   EXPECT_EQ(result.fit.model.base().effects[result.steps[0].effect].effect->name, "tip_radius");
+}
+
+// Two effects in one round: the one that is named is not said to be all.
+TEST(GroupDifference, SaysWhereOneEffectIsNotTheWholeOfIt) {
+  const Effects push = {{"object_push", {"shift_mm=0.5"}}};
+  Effects both = push;
+  both.push_back({"tool_yaw", {"angle_deg=1.5"}});
+  const Selected one = SelectFor(WithEffectIn(push, InRound2)), two = SelectFor(WithEffectIn(both, InRound2));
+  ASSERT_TRUE(one.result.group.has_value());
+  ASSERT_TRUE(two.result.group.has_value());
+  EXPECT_THAT(one.result.group->words, ::testing::Not(::testing::HasSubstr("not the whole of it")));
+  EXPECT_THAT(two.result.group->words, ::testing::HasSubstr("not the whole of it"));
+}
+
+// Times that are off by less than files are rounded to have a pattern and no cause.
+TEST(GroupDifference, IsNotClaimedWithinRounding) {
+  touches::HiddenRig rig;
+  rig.rounds = 4;
+  rig.sigma_us = 0.1;
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  for (int row = 0; row < set->size(); ++row)
+    if (InRound2(row / 24 % 4, row)) set->time_s[row * 3] += 5e-6;
+  input.set = set;
+  EXPECT_FALSE(SelectFor(input).result.group.has_value());
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/selection/ladder.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -40,11 +40,8 @@ DiagnosisInput WithPlay(const std::string& plus, const std::string& minus) {
 }
 
 Ladder LadderOf(const DiagnosisInput& input) {
-  auto workspace = MakeWorkspace(input, {});
-  EXPECT_TRUE(workspace.ok()) << workspace.status();
-  auto selection = SelectExplanation(workspace->get());
-  EXPECT_TRUE(selection.ok()) << selection.status();
-  auto ladder = BuildLadder(**workspace, &*selection);
+  Selected selected = SelectFor(input);
+  auto ladder = BuildLadder(*selected.workspace, &selected.result);
   EXPECT_TRUE(ladder.ok()) << ladder.status();
   return *std::move(ladder);
 }
@@ -76,6 +73,7 @@ TEST(PoseScatter, IsNamedBesideNoiseThatSaysTheSame) {
   EXPECT_FALSE(FindPoseScatter(o, (*workspace)->nominal, residuals, noise).has_value());
 }
 
+// Slow: three whole diagnoses, of sets large enough to tell the kinds of scatter apart.
 TEST(PoseScatter, NoiseOfTheFingersKeepsItsName) {
   for (const Effects& noise : std::vector<Effects>{{{"incidence_noise", {"slope=1"}}},
                                                    {{"finger_noise", {"sigma_us=5000,0,0"}}},

@@ -5,23 +5,10 @@
 #include <cmath>
 
 #include "server/base/test_tier.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-struct Selected {
-  std::unique_ptr<Workspace> workspace;
-  SelectionResult result;
-};
-
-Selected SelectFor(const DiagnosisInput& input) {
-  auto workspace = MakeWorkspace(input, {});
-  EXPECT_TRUE(workspace.ok()) << workspace.status();
-  auto result = SelectExplanation(workspace->get());
-  EXPECT_TRUE(result.ok()) << result.status();
-  return {*std::move(workspace), *std::move(result)};
-}
 
 TEST(SelectExplanation, FindsOneStepWithItsProbabilityAndNoSurfaceError) {
   touches::HiddenRig rig;

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/selection/ladder.h"
-#include "server/diagnosis/touches/simulated_test_set.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::selection {
@@ -64,11 +64,8 @@ TEST(PairsAtTwoSpeeds, AsksForAThirdSpeed) {
     set->speed_m_s[row] = speed_m_s;
   }
   input.set = set;
-  auto workspace = MakeWorkspace(input, {});
-  ASSERT_TRUE(workspace.ok()) << workspace.status();
-  auto selection = SelectExplanation(workspace->get());
-  ASSERT_TRUE(selection.ok()) << selection.status();
-  const auto ladder = BuildLadder(**workspace, &*selection);
+  Selected selected = SelectFor(input);
+  const auto ladder = BuildLadder(*selected.workspace, &selected.result);
   ASSERT_TRUE(ladder.ok()) << ladder.status();
   int doubted = 0;
   for (const engine::LadderStep& step : ladder->steps) {

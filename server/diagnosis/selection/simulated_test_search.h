@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "server/diagnosis/selection/workspace.h"
+#include "server/diagnosis/selection/selection.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis::selection {
@@ -36,6 +36,19 @@ inline TestSearch PrepareTestSearch(
   EXPECT_TRUE(details.ok()) << details.status();
   search.details = *std::move(details);
   return search;
+}
+
+struct Selected {
+  std::unique_ptr<Workspace> workspace;
+  SelectionResult result;
+};
+
+inline Selected SelectFor(const DiagnosisInput& input) {
+  auto workspace = MakeWorkspace(input, {});
+  EXPECT_TRUE(workspace.ok()) << workspace.status();
+  auto result = SelectExplanation(workspace->get());
+  EXPECT_TRUE(result.ok()) << result.status();
+  return {*std::move(workspace), *std::move(result)};
 }
 
 }  // namespace touchstone::diagnosis::selection
