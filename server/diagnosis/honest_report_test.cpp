@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/random.h"
+#include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
@@ -160,20 +161,26 @@ TEST(HonestReport, SaysThatAPartOfTheTimesWasReadInTicks) {
 // An effect of one round is neither one of all touches, nor noise, nor the speed of that round.
 TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuch) {
   touches::HiddenRig rig;
+  rig.objects = {"lat00", "lat05", "lat10", "lat15", "lat20"};
+  rig.samples_per_face = 8;
   rig.rounds = 4;
+  rig.sigma_us = 5000;
   const DiagnosisInput right = touches::MakeTestInput(rig);
-  rig.hidden = {{"oblique_slip", {"travel_mm=0.5"}}};
-  const DiagnosisInput slipped = touches::MakeTestInput(rig);
-  const report::Diagnosis diagnosis = Diagnosed(Spoilt(right, [&](session::MeasurementSet* set) {
+  rig.hidden = {{"object_push", {"shift_mm=0.1"}}};
+  const DiagnosisInput pushed = touches::MakeTestInput(rig);
+  const DiagnosisInput mixed = Spoilt(right, [&](session::MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row)
-      if (row / 24 % 4 == 2)
-        for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = slipped.set->time_s[row * 3 + i];
-  }));
+      if (row / 48 % 4 == 2)
+        for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = pushed.set->time_s[row * 3 + i];
+  });
+  // By itself, the round looks as if it had been made at another speed.
+  EXPECT_FALSE(checks::FindRoundAtAnotherSpeed(mixed, nullptr).empty());
+  const report::Diagnosis diagnosis = Diagnosed(mixed);
   EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
   EXPECT_TRUE(diagnosis.steps.empty());
   ASSERT_TRUE(diagnosis.data[0].unexplained.has_value());
   const engine::UnexplainedRest& rest = *diagnosis.data[0].unexplained;
-  EXPECT_THAT(rest.words, HasSubstr("in round 2: oblique_slip differs there by travel_mm +0."));
+  EXPECT_THAT(rest.words, HasSubstr("in round 2: object_push differs there by shift_mm +0."));
   EXPECT_EQ(rest.covariates[0].name, "round");
 }
 
