@@ -9,6 +9,7 @@ import collections
 import os
 import pathlib
 import re
+import signal
 
 import pytest
 
@@ -52,6 +53,17 @@ def pytest_configure(config):
     path = os.environ.get("TOUCHSTONE_TEST_TIMES")
     if path and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Times(path))
+
+
+@pytest.fixture(scope="session")
+def stop_and_wait():
+    """Stops a child process and returns once all of its threads stand: kill() returns before, and a thread may still answer."""
+    def stop(process):
+        process.send_signal(signal.SIGSTOP)
+        # Also where it ended instead; its exit status is left for its owner.
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+
+    return stop
 
 
 def _reason(item):

@@ -150,7 +150,7 @@ def test_a_dry_run_checks_and_draws_and_moves_nothing(rig, plan, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def session(rig, plan, tmp_path_factory):
+def session(rig, plan, stop_and_wait, tmp_path_factory):
     """The journal of a run that was interrupted by Ctrl-C, then killed, and then went on to its end."""
     journal = tmp_path_factory.mktemp("session") / "session.db"
     words = [BIN / "touchstone", "rig", "run", plan, "-o", journal, "--session", "monday", "--server", rig]
@@ -162,7 +162,7 @@ def session(rig, plan, tmp_path_factory):
         deadline = time.monotonic() + PATIENCE_S
         # It stands still while it is looked at: a busy machine would let it end meanwhile.
         while process.poll() is None and time.monotonic() < deadline:
-            process.send_signal(signal.SIGSTOP)
+            stop_and_wait(process)
             interrupt = journal.exists() and done(journal) >= enough
             if interrupt:
                 process.send_signal(signal_number)

@@ -47,13 +47,17 @@ def fast(monkeypatch):
     monkeypatch.setattr(connection, "_OPTIONS", tuple((name, FAST.get(name, value)) for name, value in connection._OPTIONS))
 
 
-@contextlib.contextmanager
-def stopped(server):
-    server.process.send_signal(signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        server.process.send_signal(signal.SIGCONT)
+@pytest.fixture
+def stopped(stop_and_wait):
+    @contextlib.contextmanager
+    def hold(server):
+        stop_and_wait(server.process)
+        try:
+            yield
+        finally:
+            server.process.send_signal(signal.SIGCONT)
+
+    return hold
 
 
 def test_connect_goes_on_to_the_next_source_where_one_hangs(server, silent):
@@ -75,13 +79,13 @@ def test_each_source_gets_its_time_once(silent):
     assert time.monotonic() - began < 30
 
 
-def test_a_call_leaves_a_source_that_is_stopped(new_server, fast):
+def test_a_call_leaves_a_source_that_is_stopped(new_server, stopped, fast):
     first, second = new_server(), new_server()
     with touchstone.connect([first.target, second.target]) as client, stopped(first):
         assert client.objects() and client.target == second.target
 
 
-def test_a_stream_leaves_a_source_that_is_stopped(server, new_server, losses, fast):
+def test_a_stream_leaves_a_source_that_is_stopped(server, new_server, stopped, losses, fast):
     what: dict[str, Any] = {"objects": ["lat00", "lat20"], "samples": 200_000, "seed": 5, "columns": ("index", "descriptor"), "batch_size": 500}
     first, second = new_server(), new_server()
     batches = []
