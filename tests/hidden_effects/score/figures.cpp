@@ -9,7 +9,7 @@ namespace {
 using Strings = std::vector<std::string>;
 
 constexpr double kConfident = 0.9, kNearlyCertain = 0.99, kShownAsOne = 0.9995;
-constexpr double kFall = 0.95, kFoundWithin = 0.05;
+constexpr double kFall = 0.95, kFoundWithin = 0.05, kFreshWithin = 0.1;
 
 bool IsIn(const Strings& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -227,6 +227,11 @@ bool ClaimsAFall(const v1::Report& report) {
          TouchEntry(report).final().rmse() < kFall * TouchEntry(report).initial().rmse();
 }
 
+double ClaimedErrorUs(const v1::Report& report) {
+  const v1::Quality& final = TouchEntry(report).final();
+  return final.heldout_rmse() > 0 ? final.heldout_rmse() : final.rmse();
+}
+
 bool FallIsNotFound(const v1::Report& report, double final_found_us) {
   return ClaimsAFall(report) &&
          !(std::abs(final_found_us / TouchEntry(report).final().rmse() - 1) <= kFoundWithin);
@@ -247,8 +252,11 @@ std::vector<Mark> JudgeFigures(const Arm& arm, const Scenario& truth, const v1::
     if (step.probability() > kNearlyCertain && !IsNameless(step.effect()))
       out.push_back({"claim beyond 0.99 right", HoldsTruth(step, answer)});
   }
-  if (ClaimsAFall(report))
+  if (ClaimsAFall(report)) {
     out.push_back({"fall not found again", FallIsNotFound(report, tried.final_found_us)});
+    out.push_back({"error on fresh touches as claimed",
+                   std::abs(tried.fresh_us / ClaimedErrorUs(report) - 1) <= kFreshWithin});
+  }
   if (arm.depends_on_time)
     out.push_back({"unexplained by time", right && report.verdict() == v1::Report::UNEXPLAINED});
   if (IsACurve(arm, truth)) out.push_back({"lookup halves the misfit", tried.lookup_cuts_to <= 0.5});

@@ -109,6 +109,27 @@ TEST(Figures, AFallMustBeFoundAgain) {
   EXPECT_FALSE(ClaimsAFall(Says(v1::Report::ADEQUATE, 5000, 4900)));
 }
 
+TEST(Figures, AnErrorIsAsClaimedWhereFreshTouchesLeaveItWithinATenth) {
+  v1::Report report = Says(v1::Report::MISSING_EFFECTS, 12'000, 5000);
+  report.mutable_data(0)->mutable_final()->set_heldout_rmse(5200);
+  Scenario truth;
+  truth.hidden = {{"object_push", {0.3}}};
+  const auto as_claimed = [&](double fresh_us) {
+    Tried tried;
+    tried.final_found_us = 5000;
+    tried.fresh_us = fresh_us;
+    for (const Mark& mark : JudgeFigures(*FindArm("one"), truth, report, {}, tried))
+      if (mark.measure == "error on fresh touches as claimed") return mark.yes;
+    ADD_FAILURE() << "not marked";
+    return false;
+  };
+  EXPECT_EQ(ClaimedErrorUs(report), 5200);
+  EXPECT_TRUE(as_claimed(5700));
+  EXPECT_FALSE(as_claimed(5750));
+  EXPECT_FALSE(as_claimed(std::numeric_limits<double>::infinity()));
+  EXPECT_FALSE(as_claimed(NAN)) << "nothing was tried";
+}
+
 TEST(Figures, AnEquivalentThatHoldsTheTruthIsHonest) {
   Scenario truth;
   truth.hidden = {{"tip_radius", {1}}};

@@ -51,6 +51,9 @@ int main(int argc, char** argv) {
              outcome.arm->name.c_str(), static_cast<unsigned long long>(outcome.seed), outcome.seconds,
              TruthInWords(outcome.set.truth).c_str(), ReportInWords(outcome.report).c_str(),
              outcome.error.c_str());
+      if (ClaimsAFall(outcome.report))
+        printf("        unseen touches leave %.0f us by the report, fresh ones %.0f us\n",
+               ClaimedErrorUs(outcome.report), outcome.tried.fresh_us);
       for (const std::vector<Mark>* marks : {&outcome.marks, &outcome.figures})
         for (const Mark& mark : *marks)
           printf("        %s: %s\n", mark.measure.c_str(), mark.yes ? "yes" : "no");

@@ -56,14 +56,16 @@ void JudgeOutcome(const TestObjects& objects, Outcome* out) {
   const Arm& arm = *out->arm;
   const Scenario& truth = out->set.truth;
   const v1::Unexplained& unexplained = TouchEntry(out->report).unexplained();
-  Tried tried;
+  Tried& tried = out->tried;
   if (arm.kind == Kind::kUnlisted)
     tried.formula_cuts_to = CutsTo(truth, out->seed, unexplained.formula_yaml(), objects);
   if (IsACurve(arm, truth))
     tried.lookup_cuts_to = CutsTo(truth, out->seed, unexplained.lookup_yaml(), objects);
-  if (ClaimsAFall(out->report))
-    tried.final_found_us = FinalRmseFoundAgainUs(out->set, out->report, objects)
-                               .value_or(std::numeric_limits<double>::infinity());
+  if (ClaimsAFall(out->report)) {
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    tried.final_found_us = FinalRmseFoundAgainUs(out->set, out->report, objects).value_or(kNone);
+    tried.fresh_us = FreshRmseUs(truth, out->seed, out->report, objects).value_or(kNone);
+  }
   out->marks = Judge(arm, truth, out->report, tried.formula_cuts_to);
   if (out->error.empty()) {
     out->figures = JudgeFigures(arm, truth, out->report, out->marks, tried);

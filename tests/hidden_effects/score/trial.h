@@ -28,6 +28,7 @@ struct Outcome {
   uint64_t seed = 0;
   Set set;
   v1::Report report;
+  Tried tried;  // what it claims, tried again
   std::vector<Mark> marks, figures, bic, rmse_drop, gp;
   double seconds = 0;      // of Diagnose, CPU time
   bool timed_out = false;  // there is no report, since it took too long

@@ -20,6 +20,11 @@ absl::StatusOr<double> FinalRmseFoundAgainUs(const Set& set, const v1::Report& r
   return compared.data[0].final->rmse;
 }
 
+absl::StatusOr<double> FreshRmseUs(const Scenario& truth, uint64_t seed, const v1::Report& report,
+                                   const TestObjects& objects) {
+  return FinalRmseFoundAgainUs(Generate(truth, seed + kFreshSeeds), report, objects);
+}
+
 std::string WithEffect(const std::string& model_yaml, const std::string& effect_yaml) {
   const size_t list = effect_yaml.find("effects:");
   const std::string item =

@@ -17,6 +17,10 @@ namespace touchstone::hidden {
 absl::StatusOr<double> FinalRmseFoundAgainUs(const Set& set, const v1::Report& report,
                                              const TestObjects& objects);
 
+// The same on fresh touches: another set of the same scenario, with other poses and noise.
+absl::StatusOr<double> FreshRmseUs(const Scenario& truth, uint64_t seed, const v1::Report& report,
+                                   const TestObjects& objects);
+
 // A whole effect, an item of the list with or without that list around it, added to a model file.
 std::string WithEffect(const std::string& model_yaml, const std::string& effect_yaml);
 

@@ -22,6 +22,23 @@ v1::Report ReportOf(const char* effect, double value) {
   return report;
 }
 
+TEST(FreshRmse, IsTheNoiseWithTheTrueModelAndMoreWithoutIt) {
+  const Scenario truth = [] {
+    const Arm& arm = *FindArm("one");
+    Scenario scenario = arm.draw(SharedTestObjects(), SeedOf(Seeds::kTuning, arm, 0));
+    scenario.hidden = {{"object_push", {0.4}}};
+    return scenario;
+  }();
+  v1::Report report;
+  const auto without = FreshRmseUs(truth, 3, report, SharedTestObjects());
+  report.set_improved_model_yaml(
+      WithEffect(Generate(truth, 3).model_yaml, "  - object_push: {shift_mm: 0.4}\n"));
+  const auto with = FreshRmseUs(truth, 3, report, SharedTestObjects());
+  ASSERT_TRUE(without.ok() && with.ok()) << without.status() << with.status();
+  EXPECT_NEAR(*with, truth.sigma_us, 0.05 * truth.sigma_us);
+  EXPECT_GT(*without, 1.2 * *with);
+}
+
 TEST(FittedCopy, HasTheValueAndTheNoiseThatWereFound) {
   const auto copy = FittedCopy(WithPush(), ReportOf("object_push", 0.41));
   ASSERT_TRUE(copy);
