@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "server/base/random.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/joint_test_set.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis {
@@ -158,21 +160,26 @@ TEST(HonestReport, SaysThatAPartOfTheTimesWasReadInTicks) {
   EXPECT_LT(*diagnosis.p_nothing_missing, 1e-6);
 }
 
-// An effect of one round is neither one of all touches, nor noise, nor the speed of that round.
-TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuch) {
-  touches::HiddenRig rig;
-  rig.objects = {"lat00", "lat05", "lat10", "lat15", "lat20"};
+// Objects lat00, lat05 ..., 48 poses each, with a push in round 2 of 4.
+DiagnosisInput PushedInOneRound(touches::HiddenRig rig) {
   rig.samples_per_face = 8;
   rig.rounds = 4;
   rig.sigma_us = 5000;
   const DiagnosisInput right = touches::MakeTestInput(rig);
   rig.hidden = {{"object_push", {"shift_mm=0.1"}}};
   const DiagnosisInput pushed = touches::MakeTestInput(rig);
-  const DiagnosisInput mixed = Spoilt(right, [&](session::MeasurementSet* set) {
+  return Spoilt(right, [&](session::MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row)
       if (row / 48 % 4 == 2)
         for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = pushed.set->time_s[row * 3 + i];
   });
+}
+
+// An effect of one round is neither one of all touches, nor noise, nor the speed of that round.
+TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuch) {
+  touches::HiddenRig rig;
+  rig.objects = {"lat00", "lat05", "lat10", "lat15", "lat20"};
+  const DiagnosisInput mixed = PushedInOneRound(rig);
   // By itself, the round looks as if it had been made at another speed.
   EXPECT_FALSE(checks::FindRoundAtAnotherSpeed(mixed, nullptr).empty());
   const report::Diagnosis diagnosis = Diagnosed(mixed);
@@ -182,6 +189,23 @@ TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuch) {
   const engine::UnexplainedRest& rest = *diagnosis.data[0].unexplained;
   EXPECT_THAT(rest.words, HasSubstr("in round 2: object_push differs there by shift_mm +0."));
   EXPECT_EQ(rest.covariates[0].name, "round");
+}
+
+TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuchBesidePhotographs) {
+  TOUCHSTONE_SECOND_TIER("long: whole diagnoses of pictures and touches");
+  joint::HiddenSession session;
+  session.camera.side_px = 64;
+  session.rig.objects = {"lat00", "lat05", "lat10", "lat15", "lat20"};
+  const DiagnosisInput photographed = joint::MakeJointInput(session);
+  DiagnosisInput both = PushedInOneRound(session.rig);
+  ASSERT_FALSE(checks::FindRoundAtAnotherSpeed(both, nullptr).empty());
+  both.images = photographed.images;
+  both.model = photographed.model;
+  const report::Diagnosis diagnosis = Diagnosed(both);
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
+  EXPECT_TRUE(diagnosis.data_problems.empty());
+  ASSERT_TRUE(diagnosis.data[0].unexplained.has_value());
+  EXPECT_THAT(diagnosis.data[0].unexplained->words, HasSubstr("in round 2: object_push differs there"));
 }
 
 TEST(HonestReport, ARoundAtAnotherSpeedIsAMistakeOfTheFile) {
