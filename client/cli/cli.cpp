@@ -3,12 +3,10 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <limits>
 #include <utility>
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_replace.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
@@ -17,6 +15,7 @@
 #include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/provenance.h"
+#include "client/cli/whole_number.h"
 #include "client/source/lease_keeper.h"
 #include "server/base/printable.h"
 #include "server/base/status.h"
@@ -42,15 +41,11 @@ std::vector<std::string> CommandNames(const CLI::App* app) {
   return names;
 }
 
-// Counts and seeds: CLI11 would take -1 for 2^64 - 1 and 010 for 8.
+// Of an option that is a count or a seed.
 std::string CheckWholeNumber(std::string& text) {
-  uint64_t value = 0;
-  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos)
-    return absl::StrCat("'", text,
-                        "' is no whole number from 0 on, written with digits alone, for instance 1000");
-  if (!absl::SimpleAtoi(text, &value))
-    return absl::StrCat("'", text, "' is too large; at most ", std::numeric_limits<uint64_t>::max());
-  text = absl::StrCat(value);
+  const absl::StatusOr<uint64_t> value = ParseWholeNumber(text);
+  if (!value.ok()) return std::string(value.status().message());
+  text = absl::StrCat(*value);
   return "";
 }
 
@@ -84,8 +79,8 @@ Cli::Cli()
   app_.require_subcommand(0, 1);
   app_.footer(
       "Without --server the simulation runs in this process; with --server HOST:PORT a running "
-      "touchstone-server\n"
-      "does it. Both give the same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable,\n"
+      "touchstone-server "
+      "does it. Both give the same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable, "
       "4 refused or failed by the source, 130 interrupted.");
 }
 

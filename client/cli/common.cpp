@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "client/cli/terminal.h"
 #include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -22,8 +23,6 @@ namespace touchstone::cli {
 namespace {
 
 constexpr uint64_t kMaxModelBytes = 16 << 20;
-constexpr size_t kTableWidth = 120;
-constexpr size_t kMinLastColumn = 40;
 
 }  // namespace
 
@@ -117,24 +116,50 @@ absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& te
 }
 
 std::string Table::Text() const {
-  std::vector<size_t> widths;
-  for (const auto& row : rows_) {
-    widths.resize(std::max(widths.size(), row.size()));
-    for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-  }
-  size_t indent = 0;
-  for (size_t i = 0; i + 1 < widths.size(); ++i) indent += widths[i] + 2;
-  const size_t width = std::max(kTableWidth, indent + kMinLastColumn);
+  const std::vector<size_t> widths = Widths();
   std::string text;
   for (const auto& row : rows_) {
+    std::vector<std::vector<std::string>> cells;
+    size_t lines = 1;
     for (size_t i = 0; i < row.size(); ++i) {
-      text += i + 1 == widths.size() ? Wrap(row[i], width, indent) : row[i];
-      if (i + 1 < row.size()) text.append(widths[i] - row[i].size() + 2, ' ');
+      cells.push_back(absl::StrSplit(Wrap(row[i], widths[i], 0), '\n'));
+      lines = std::max(lines, cells.back().size());
     }
-    text.erase(text.find_last_not_of(' ') + 1);
-    text += '\n';
+    for (size_t line = 0; line < lines; ++line) {
+      std::string shown;
+      for (size_t i = 0, begins = 0; i < cells.size(); begins += widths[i] + 2, ++i) {
+        if (line >= cells[i].size()) continue;
+        shown.append(begins > shown.size() ? begins - shown.size() : 0, ' ');
+        shown += cells[i][line];
+      }
+      shown.erase(shown.find_last_not_of(' ') + 1);
+      absl::StrAppend(&text, shown, "\n");
+    }
   }
   return text;
+}
+
+std::vector<size_t> Table::Widths() const {
+  std::vector<size_t> widths, longest_word;
+  for (const auto& row : rows_) {
+    widths.resize(std::max(widths.size(), row.size()));
+    longest_word.resize(widths.size());
+    for (size_t i = 0; i < row.size(); ++i) {
+      widths[i] = std::max(widths[i], row[i].size());
+      for (const absl::string_view word : absl::StrSplit(row[i], ' '))
+        longest_word[i] = std::max(longest_word[i], word.size());
+    }
+  }
+  size_t total = 0;
+  for (const size_t width : widths) total += width + 2;
+  for (; total > TextWidth() + 2; --total) {
+    size_t* widest = nullptr;
+    for (size_t i = 0; i < widths.size(); ++i)
+      if (widths[i] > longest_word[i] && (widest == nullptr || widths[i] > *widest)) widest = &widths[i];
+    if (widest == nullptr) break;
+    --*widest;
+  }
+  return widths;
 }
 
 std::string Wrap(absl::string_view text, size_t width, size_t indent) {

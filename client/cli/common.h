@@ -81,6 +81,8 @@ class Cli {
   // server has its own, and the caller may send these along.
   absl::StatusOr<std::unique_ptr<client::Connection>> ConnectWithMeshes(
       std::vector<source::MeshSpec> meshes) const;
+  // All commands with their options.
+  const CLI::App& app() const { return app_; }
   const SourceOptions& source() const { return source_; }
   // What --renderer and --egl-device say; INVALID_ARGUMENT for an unknown kind.
   absl::StatusOr<image::RendererOptions> Renderer() const;
@@ -148,7 +150,8 @@ absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& te
 
 // --- Output
 
-// Columns of text, each as wide as its widest cell, two blanks between them; the last one is wrapped.
+// Columns of text, each as wide as its widest cell, two blanks between them. Where that is wider than the terminal, cells of
+// the widest columns are wrapped; a word stays whole.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
@@ -156,6 +159,8 @@ class Table {
   std::string Text() const;
 
  private:
+  std::vector<size_t> Widths() const;
+
   std::vector<std::vector<std::string>> rows_;
 };
 
@@ -188,5 +193,6 @@ void AddSession(Cli* cli);
 void AddRig(Cli* cli);
 void AddToken(Cli* cli);
 void AddDoctor(Cli* cli);
+void AddHelp(Cli* cli);  // help, version, completion
 
 }  // namespace touchstone::cli

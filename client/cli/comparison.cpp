@@ -2,7 +2,6 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,6 +16,7 @@
 
 #include "client/cli/journal_session.h"
 #include "client/cli/session_images.h"
+#include "client/cli/terminal.h"
 #include "client/report/report.h"
 #include "client/workbench/page.h"
 #include "server/base/check.h"
@@ -41,8 +41,6 @@ constexpr size_t kPiece = 1 << 20;
 // Of a folder with many meshes, those that the set does not name: so many are tried as what was touched.
 constexpr size_t kMaxFurtherMeshes = 12;
 constexpr uint64_t kMaxFurtherBytes = 32 << 20;
-constexpr int kWidthOfNoTerminal = 110;
-constexpr int kMinWidth = 60, kMaxWidth = 160;
 
 // A set as the user names it: its file's text, the name of a session that the server keeps, what a rig's journal
 // holds, or the files of a folder of photographs (with the text of its touches.csv, if it has one).
@@ -199,12 +197,6 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
   std::vector<source::MeshSpec> list;
   for (const auto& [name, source] : meshes) list.push_back(source);
   return list;
-}
-
-int TerminalWidth() {
-  winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return kWidthOfNoTerminal;
-  return std::clamp<int>(size.ws_col, kMinWidth, kMaxWidth);
 }
 
 }  // namespace

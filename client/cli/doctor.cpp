@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "client/cli/common.h"
+#include "client/cli/terminal.h"
 #include "server/base/status.h"
 #include "server/base/version.h"
 #include "server/geometry/surface.h"
@@ -216,7 +217,7 @@ class Doctor {
     for (const Finding& finding : findings_) {
       std::string line = absl::StrCat(finding.good ? "ok  " : "!!  ", finding.topic);
       line.append(line.size() < 15 ? 15 - line.size() : 1, ' ');
-      absl::StrAppend(&text, line, Wrap(finding.text, 100, 15), "\n");
+      absl::StrAppend(&text, line, Wrap(finding.text, TextWidth(), 15), "\n");
     }
     return text;
   }

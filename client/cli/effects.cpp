@@ -1,5 +1,6 @@
 // touchstone effects: the catalogue, and what one effect is.
 #include "client/cli/common.h"
+#include "client/cli/terminal.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/formula.h"
@@ -8,7 +9,6 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kWidth = 100;
 constexpr size_t kIndent = 12;
 
 std::string WithUnit(double value, const std::string& unit) {
@@ -85,7 +85,7 @@ Json EffectJson(const v1::Effect& effect) {
 std::string Paragraph(const std::string& title, const std::string& text) {
   std::string line = title;
   line.append(line.size() < kIndent ? kIndent - line.size() : 1, ' ');
-  return line + Wrap(text, kWidth, kIndent) + "\n";
+  return line + Wrap(text, TextWidth(), kIndent) + "\n";
 }
 
 // What an expression may use: the table that the formula's compiler reads.

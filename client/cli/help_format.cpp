@@ -1,12 +1,12 @@
 #include "client/cli/help_format.h"
 
 #include "client/cli/common.h"
+#include "client/cli/terminal.h"
 
 namespace touchstone::cli {
 namespace {
 
 constexpr size_t kHelpColumn = 32;
-constexpr size_t kHelpWidth = 110;
 
 // One line of what it is, then examples, then usage and options.
 class HelpFormat : public CLI::Formatter {
@@ -21,7 +21,12 @@ class HelpFormat : public CLI::Formatter {
   }
 
   std::string make_description(const CLI::App* app) const override {
-    return absl::StrCat(Wrap(app->get_description(), kHelpWidth, 0), "\n\nExamples:\n", examples_, "\n");
+    return absl::StrCat(Wrap(app->get_description(), TextWidth(), 0), "\n\nExamples:\n", examples_, "\n");
+  }
+
+  std::string make_footer(const CLI::App* app) const override {
+    const std::string footer = app->get_footer();
+    return footer.empty() ? "" : Wrap(footer, TextWidth(), 0) + "\n";
   }
 
   // One blank line between paragraphs.
@@ -39,7 +44,7 @@ class HelpFormat : public CLI::Formatter {
     if (!line.empty() && line.back() == '.') line.pop_back();
     std::string text = "  " + sub->get_name();
     text.append(text.size() < 14 ? 14 - text.size() : 1, ' ');
-    return text + line + "\n";
+    return text + Wrap(line, TextWidth(), text.size()) + "\n";
   }
 
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
@@ -48,7 +53,7 @@ class HelpFormat : public CLI::Formatter {
       left += "\n" + std::string(kHelpColumn, ' ');
     else
       left.append(kHelpColumn - left.size(), ' ');
-    return left + Wrap(make_option_desc(option), kHelpWidth, kHelpColumn) + "\n";
+    return left + Wrap(make_option_desc(option), TextWidth(), kHelpColumn) + "\n";
   }
 
   std::string make_option_opts(const CLI::Option* option) const override {

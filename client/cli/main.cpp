@@ -29,6 +29,7 @@ void AddCommands(Cli* cli) {
   AddRig(cli);
   AddToken(cli);
   AddDoctor(cli);
+  AddHelp(cli);
 }
 
 }  // namespace touchstone::cli

@@ -6,6 +6,7 @@
 #include "client/cli/journal_session.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/rig_calibrate.h"
+#include "client/cli/terminal.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -136,7 +137,7 @@ absl::Status RunFlat(const Cli& cli, const CalibrateOptions& options) {
                          Rounded(fit.offset_std_error_m[finger] * kMillimetresPerMetre), " mm"));
   cli.Log(absl::StrCat("  noise     ", Rounded(fit.sigma_s * kMicrosecondsPerSecond), " +- ",
                        Rounded(fit.sigma_std_error_s * kMicrosecondsPerSecond), " us"));
-  if (!fit.note.empty()) cli.Log(Wrap(fit.note, 110, 0));
+  if (!fit.note.empty()) cli.Log(Wrap(fit.note, TextWidth(), 0));
   return absl::OkStatus();
 }
 

@@ -6,6 +6,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include "client/cli/rig.h"
+#include "client/cli/terminal.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -101,7 +102,7 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
   if (!state.stop_reason().empty())
     text += Line("", Wrap(absl::StrCat("stopped ", state.stop_reason(),
                                        "; make sure that the rig may move, then touchstone rig reset"),
-                          110, 16));
+                          TextWidth(), 16));
   text += absl::StrCat("Object        ",
                        rig.object().empty() ? "what lies on the fixture is unknown (touchstone rig mount)"
                                             : absl::StrCat(rig.object(), " with its face ",
@@ -122,11 +123,11 @@ std::string StateText(const v1::RigState& rig, const v1::State& state) {
   if (rig.recovered_touches() + rig.interrupted_touches() > 0)
     text += absl::StrCat("After an interruption: ", Counted(rig.recovered_touches(), "touch", "touches"),
                          " recovered, ", rig.interrupted_touches(), " not\n");
-  if (!rig.last_error().empty()) text += "Last error    " + Wrap(rig.last_error(), 110, 14) + "\n";
+  if (!rig.last_error().empty()) text += "Last error    " + Wrap(rig.last_error(), TextWidth(), 14) + "\n";
   if (rig.time_scale() != 0 && rig.time_scale() != 1)
     text += absl::StrCat("Time          ", Rounded(rig.time_scale()),
                          " rig seconds in one second: an emulator; nothing here is measured\n");
-  if (!rig.safety_notice().empty()) text += "\n" + Wrap(rig.safety_notice(), 110, 0) + "\n";
+  if (!rig.safety_notice().empty()) text += "\n" + Wrap(rig.safety_notice(), TextWidth(), 0) + "\n";
   return text;
 }
 

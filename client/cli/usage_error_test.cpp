@@ -88,7 +88,7 @@ TEST_F(UsageErrorTest, AnUnreachableSourceIsExitCode3) {
 }
 
 TEST_F(UsageErrorTest, ACountIsAWholeNumberFromZeroOn) {
-  for (const std::string count : {"-5", "1e6", "2.5", "ten"}) {
+  for (const std::string count : {"-5", "1e-6", "2.5", "ten"}) {
     const Outcome outcome = Run({"stream", "--samples=" + count, "--out", "d"});
     EXPECT_EQ(outcome.exit_code, 2) << count;
     EXPECT_THAT(outcome.err, HasSubstr("--samples")) << count;
@@ -97,6 +97,8 @@ TEST_F(UsageErrorTest, ACountIsAWholeNumberFromZeroOn) {
               HasSubstr("--samples: '-5' is no whole number from 0 on"));
   EXPECT_THAT(Run({"touch", "lat20", "--approach", "0,0,-1", "--seed", "99999999999999999999"}).err,
               HasSubstr("--seed: '99999999999999999999' is too large"));
+  EXPECT_EQ(Run({"touch", "lat20", "--approach", "0,0,-1", "--repeats", "1e1"}).out,
+            Run({"touch", "lat20", "--approach", "0,0,-1", "--repeats", "10"}).out);
   // Not the octal number that C would read.
   EXPECT_EQ(Run({"touch", "lat20", "--approach", "0,0,-1", "--repeats", "010"}).out,
             Run({"touch", "lat20", "--approach", "0,0,-1", "--repeats", "10"}).out);

@@ -1,0 +1,103 @@
+// touchstone help, version, completion, and the width of what they print.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_split.h>
+
+#include "client/cli/real_binary_test.h"
+
+namespace touchstone::cli {
+namespace {
+
+using ::testing::HasSubstr;
+
+class HelpCommandTest : public RealBinaryTest {
+ protected:
+  // What bash offers for a word that is begun after `typed`.
+  std::set<std::string> Offered(const std::string& typed, const std::string& begun) {
+    Write("script", Run({"completion", "bash"}).out);
+    Write("ask", "source ./script\nCOMP_WORDS=(touchstone " + typed + " '" + begun +
+                     "')\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n_touchstone\nprintf '%s\\n' "
+                     "\"${COMPREPLY[@]}\" > offered\n");
+    EXPECT_EQ(std::system(("cd '" + Path("") + "' && bash ask").c_str()), 0);
+    const std::vector<std::string> lines = absl::StrSplit(Read("offered"), '\n', absl::SkipEmpty());
+    return {lines.begin(), lines.end()};
+  }
+
+  // Standard output where that is a terminal of so many columns.
+  std::string AtTerminal(unsigned short columns, const std::vector<std::string>& words) {
+    winsize size{};
+    size.ws_row = 24, size.ws_col = columns;
+    int terminal = -1;
+    const pid_t child = ::forkpty(&terminal, nullptr, nullptr, &size);
+    if (child == 0) {
+      std::string program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone";
+      std::vector<char*> raw = {program.data()};
+      for (const std::string& word : words) raw.push_back(const_cast<char*>(word.c_str()));
+      raw.push_back(nullptr);
+      ::execv(raw[0], raw.data());
+      ::_exit(98);
+    }
+    std::string text;
+    char piece[4096];
+    for (ssize_t n; (n = ::read(terminal, piece, sizeof piece)) > 0;)
+      text.append(piece, static_cast<size_t>(n));
+    ::close(terminal);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+    return text;
+  }
+};
+
+TEST_F(HelpCommandTest, HelpIsThatOfTheCommand) {
+  EXPECT_EQ(Run({"help"}).out, Run({"--help"}).out);
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"diagnose"}, {"rig", "run"}, {"model"}}) {
+    std::vector<std::string> asked = {"help"}, direct = words;
+    asked.insert(asked.end(), words.begin(), words.end());
+    direct.push_back("--help");
+    EXPECT_EQ(Run(asked).out, Run(direct).out) << words[0];
+  }
+  EXPECT_EQ(Run({"help", "diagnos"}).exit_code, 2);
+  EXPECT_THAT(Run({"help", "diagnos"}).err, HasSubstr("did you mean 'diagnose'?"));
+  EXPECT_THAT(Run({"help", "doctor", "who"}).err,
+              HasSubstr("'touchstone doctor' has no commands of its own"));
+}
+
+TEST_F(HelpCommandTest, VersionIsThatOfTheOption) {
+  EXPECT_EQ(Run({"version"}).out, Run({"--version"}).out);
+}
+
+TEST_F(HelpCommandTest, BashCompletesCommandsAndOptions) {
+  EXPECT_EQ(Offered("", "dia"), (std::set<std::string>{"diagnose"}));
+  EXPECT_EQ(Offered("rig", "ru"), (std::set<std::string>{"run"}));
+  EXPECT_EQ(Offered("diagnose set.csv", "--save-m"), (std::set<std::string>{"--save-model"}));
+  EXPECT_TRUE(Offered("diagnose", "set").empty()) << "files are the shell's";
+  EXPECT_EQ(Run({"completion", "tcsh"}).exit_code, 2);
+}
+
+TEST_F(HelpCommandTest, TextIsAsWideAsTheTerminal) {
+  const auto longest = [&](unsigned short columns, const char* command) {
+    size_t length = 0;
+    for (const absl::string_view line :
+         absl::StrSplit(AtTerminal(columns, {command}), absl::ByAnyChar("\r\n")))
+      // A command is not broken, so that it can be copied.
+      if (!absl::StrContains(line, "  touchstone ")) length = std::max(length, line.size());
+    return length;
+  };
+  for (const unsigned short columns : {60, 80, 120})
+    for (const char* command : {"help", "doctor"}) EXPECT_LE(longest(columns, command), columns) << command;
+  // Names of parameters are not broken either: at 60 columns this table is wider.
+  for (const unsigned short columns : {80, 120}) EXPECT_LE(longest(columns, "effects"), columns);
+  EXPECT_GT(longest(120, "effects"), 100u);
+}
+
+}  // namespace
+}  // namespace touchstone::cli
