@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <boost/asio/bind_executor.hpp>
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -350,6 +351,8 @@ class LoopbackServer : public HttpServer {
   const Handler handler_;
   Registry registry_;
   asio::io_context io_;
+  // Calls answer from threads of gRPC: what they post is run even where no socket is open any more.
+  const asio::executor_work_guard<asio::io_context::executor_type> work_{io_.get_executor()};
   tcp::acceptor acceptor_{io_};
   asio::steady_timer pause_{io_};
   int port_ = 0;

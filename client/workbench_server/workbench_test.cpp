@@ -163,5 +163,30 @@ TEST_F(WorkbenchTest, SurvivesRequestsThatAreCutAndClientsThatLeave) {
   EXPECT_TRUE(Has(Call("Models/ListEffects", MessageFrame("")), "grpc-status: 0\r\n"));
 }
 
+TEST_F(WorkbenchTest, EndsACallAtItsDeadline) {
+  v1::DiagnoseRequest request;
+  *request.mutable_evidence() = *ExampleEvidence();
+  EXPECT_TRUE(
+      Has(Call("Diagnosis/Diagnose", MessageFrame(request.SerializeAsString()), "grpc-timeout: 10m\r\n"),
+          "grpc-status: 4\r\n"));
+}
+
+TEST_F(WorkbenchTest, EndsWhileACallRuns) {
+  v1::DiagnoseRequest request;
+  *request.mutable_evidence() = *ExampleEvidence();
+  const std::string body = MessageFrame(request.SerializeAsString());
+  tcp::socket socket = Connect();
+  asio::write(socket, asio::buffer(Head("POST /touchstone.v1.Diagnosis/Diagnose", host_,
+                                        "Content-Type: application/grpc-web+proto\r\n", body.size()) +
+                                   body));
+  char byte;
+  asio::read(socket, asio::buffer(&byte, 1));
+  workbench_.reset();
+  boost::system::error_code error;
+  std::string rest;
+  asio::read(socket, asio::dynamic_buffer(rest), error);
+  EXPECT_FALSE(Has(rest, "grpc-status: 0"));
+}
+
 }  // namespace
 }  // namespace touchstone::workbench
