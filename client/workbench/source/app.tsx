@@ -65,7 +65,7 @@ export function App() {
 export function LiveApp() {
   return (
     <>
-      <div class="live-main" role="region" aria-label="Workbench"><Live /></div>
+      <div class="live-main" role={page.value ? "region" : "main"} aria-label="Workbench"><Live /></div>
       {page.value && <div class={stale.value ? "stale" : undefined}><App /></div>}
     </>
   );

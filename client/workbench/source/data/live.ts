@@ -3,6 +3,7 @@ import { computed, signal } from "@preact/signals";
 import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import { download } from "../charts/export";
 import { page, session, touchEntries } from "../state";
 
 export interface Parameter { name: string; unit: string; lower: number; upper: number; typical: number; neutral: number; meaning: string; values: number[] }
@@ -15,15 +16,24 @@ export const place = signal<{ evidence: boolean; origin: string; source: string 
 export const origin = signal("");
 export const rungs = signal<Rung[]>([]); // the given model, then one per change
 export const diagnosis = signal<Report | null>(null);
-export const working = signal<{ what: string; stage: string; done: number } | null>(null);
-export const failure = signal<{ message: string; disconnected: boolean; again: () => void } | null>(null);
+export const working = signal<{ what: string; stage: string; done: number; cancellable: boolean } | null>(null);
+// Who does not answer: the workbench itself, or the server that it asks.
+export type Lost = "workbench" | "server" | null;
+export const failure = signal<{ message: string; lost: Lost; again: () => void } | null>(null);
 export const model = computed(() => rungs.value[rungs.value.length - 1]?.model ?? null);
 // What is shown below is of another model than the last one.
 export const stale = signal(false);
+// A slider's value that the model has not taken yet.
+export interface Move { effect: ModelEffect; parameter: number; entry: number; value: number }
+export const moved = signal<Move | null>(null);
 
 let token = "";
 let evidence: Uint8Array = new Uint8Array(0);
 let running = new AbortController();
+let saved = ""; // the model that was saved last
+export const byHand = "values by hand"; // the rung of the sliders
+
+const unavailable = 14; // grpc::StatusCode
 
 async function local(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await request(`/local/${path}`, init, token);
@@ -32,17 +42,18 @@ async function local(path: string, init: RequestInit = {}): Promise<Response> {
 }
 
 // One thing at a time: what is asked last cancels what is under way.
-async function doing(what: string, act: (signal: AbortSignal) => Promise<void>): Promise<void> {
+async function doing(what: string, act: (signal: AbortSignal) => Promise<void>, cancellable = false): Promise<void> {
   running.abort();
+  if (what !== byHand) moved.value = null;
   const mine = (running = new AbortController());
-  working.value = { what, stage: "", done: 0 };
+  working.value = { what, stage: "", done: 0, cancellable };
   failure.value = null;
   try {
     await act(mine.signal);
   } catch (reason) {
     if (mine.signal.aborted) return;
-    const error = reason as Error;
-    failure.value = { message: error.message, disconnected: error instanceof Disconnected || (error instanceof CallError && error.code === 14), again: () => void doing(what, act) };
+    const lost = reason instanceof Disconnected ? "workbench" : reason instanceof CallError && reason.code === unavailable ? "server" : null;
+    failure.value = { message: (reason as Error).message, lost, again: () => void doing(what, act, cancellable) };
   } finally {
     if (running === mine) working.value = null;
   }
@@ -65,25 +76,32 @@ async function ask(method: string, yaml: string, signal: AbortSignal): Promise<U
   return report;
 }
 
-async function show(report: Uint8Array, signal: AbortSignal) {
+// The report of the last rung: its error at once, the views after the browser has painted it, unless something newer is asked.
+async function show(report: Uint8Array, signal: AbortSignal): Promise<Report> {
   const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal })).text());
-  if (signal.aborted) throw new DOMException("", "AbortError");
+  signal.throwIfAborted();
+  const rmse = data.report.data[data.words.main ?? 0]?.initial?.rmse ?? Number.NaN;
+  rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
+  await painted();
+  signal.throwIfAborted();
+  if (moved.value) return data.report;
   page.value = data;
   session.value = touchEntries.value[0]?.index ?? 0;
   stale.value = false;
-  return data;
+  return data.report;
 }
 
-const errorOf = (report: Report) => report.data[0]?.initial?.rmse ?? Number.NaN;
+// A hidden page paints nothing, and does not wait for it.
+const painted = () => new Promise<void>((done) => {
+  if (document.hidden) return done();
+  requestAnimationFrame(() => setTimeout(done));
+});
 
 async function change(of: Record<string, unknown>): Promise<Model> {
   return (await local("model", { method: "POST", body: JSON.stringify(of) })).json() as Promise<Model>;
 }
 
-async function compareLast(signal: AbortSignal): Promise<void> {
-  const data = await show(await ask("Compare", model.value!.yaml, signal), signal);
-  rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse: errorOf(data.report) } : rung));
-}
+const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
 
 async function open(path: string, what: string): Promise<void> {
   await doing(what, async (signal) => {
@@ -94,6 +112,7 @@ async function open(path: string, what: string): Promise<void> {
       if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
     }
     const given = await change({ yaml, change: "none" });
+    saved = given.yaml;
     rungs.value = [{ name: given.name, model: given, rmse: Number.NaN }];
     diagnosis.value = null;
     await compareLast(signal);
@@ -103,14 +122,27 @@ async function open(path: string, what: string): Promise<void> {
 export const openExample = () => open("evidence?example", "Making the example");
 
 export const diagnose = () => doing("Looking for what is missing", async (signal) => {
-  const data = await show(await ask("Diagnose", model.value!.yaml, signal), signal);
-  diagnosis.value = data.report;
-});
+  diagnosis.value = await show(await ask("Diagnose", model.value!.yaml, signal), signal);
+}, /*cancellable=*/true);
+
+// Ends what is under way; what is shown stays.
+export function cancel(): void {
+  running.abort();
+  working.value = null;
+}
+
+export function save(): void {
+  saved = model.value!.yaml;
+  download(`${model.value!.name || "model"}.yaml`, "text/yaml", saved);
+}
 
 export function take(effect: string, sign: string): Promise<void> {
+  const before = rungs.value; // tried again, it is added once
+  const asked = { yaml: model.value!.yaml, change: "take", effect, from: diagnosis.value!.improved_model_yaml };
   return doing(`${sign} ${effect}`, async (signal) => {
-    const next = await change({ yaml: model.value!.yaml, change: "take", effect, from: diagnosis.value!.improved_model_yaml });
-    rungs.value = [...rungs.value, { name: `${sign} ${effect}`, model: next, rmse: Number.NaN }];
+    const next = await change(asked);
+    signal.throwIfAborted();
+    rungs.value = [...before, { name: `${sign} ${effect}`, model: next, rmse: Number.NaN }];
     stale.value = true;
     await compareLast(signal);
   });
@@ -123,16 +155,30 @@ export function undo(): void {
   void doing("Back to the model before", compareLast);
 }
 
-// A slider's value; the last rung changes, since a value is no further step.
-export function setValue(effect: ModelEffect, parameter: number, entry: number, value: number): void {
-  const assignments = effect.parameters.map((one, p) => `${one.name}=${one.values.map((old, i) => (p === parameter && i === entry ? value : old)).join(",")}`);
+// A slider's value. Values that come while one is compared wait, and the last of them is the next: the error follows a slider
+// that moves all the time. All of them are one rung, which Undo takes away.
+export function setValue(move: Move): void {
+  const idle = !moved.value;
+  moved.value = move;
+  if (!idle && working.value?.what === byHand) return;
   stale.value = true;
-  void doing(`${effect.name} at ${value}`, async (signal) => {
-    const next = await change({ yaml: model.value!.yaml, change: "set", effect: effect.name, assignments });
-    if (signal.aborted) return;
-    rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, model: next } : rung));
-    await compareLast(signal);
+  void doing(byHand, async (signal) => {
+    do {
+      if (moved.value) await takeValue(moved.value, signal);
+      await compareLast(signal);
+    } while (moved.value);
   });
+}
+
+async function takeValue(move: Move, signal: AbortSignal): Promise<void> {
+  const { effect, parameter, entry, value } = move;
+  const assignments = effect.parameters.map((one, p) => `${one.name}=${one.values.map((old, i) => (p === parameter && i === entry ? value : old)).join(",")}`);
+  const next = await change({ yaml: model.value!.yaml, change: "set", effect: effect.name, assignments });
+  signal.throwIfAborted();
+  const last = rungs.value[rungs.value.length - 1];
+  const again = last.name === byHand;
+  rungs.value = [...(again ? rungs.value.slice(0, -1) : rungs.value), { name: byHand, model: next, rmse: again ? last.rmse : Number.NaN }];
+  if (moved.value === move) moved.value = null;
 }
 
 export async function startLive(): Promise<void> {
@@ -144,5 +190,6 @@ export async function startLive(): Promise<void> {
   }
   token = given ?? sessionStorage.getItem("token") ?? "";
   await doing("Connecting", async (signal) => { place.value = await (await local("state", { signal })).json(); });
+  addEventListener("beforeunload", (event) => { if (model.value && model.value.yaml !== saved) event.preventDefault(); });
   if (place.value?.evidence) await open("evidence", "Comparing");
 }
