@@ -30,6 +30,7 @@ export const moved = signal<Move | null>(null);
 let token = "";
 let evidence: Uint8Array = new Uint8Array(0);
 let running = new AbortController();
+let drawing = new AbortController(); // of the views
 let saved = ""; // the model that was saved last
 export const byHand = "values by hand"; // the rung of the sliders
 
@@ -76,19 +77,37 @@ async function ask(method: string, yaml: string, signal: AbortSignal): Promise<U
   return report;
 }
 
-// The report of the last rung: its error at once, the views after the browser has painted it, unless something newer is asked.
-async function show(report: Uint8Array, signal: AbortSignal): Promise<Report> {
-  const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal })).text());
-  signal.throwIfAborted();
-  const rmse = data.report.data[data.words.main ?? 0]?.initial?.rmse ?? Number.NaN;
-  rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
-  await painted();
-  signal.throwIfAborted();
-  if (moved.value) return data.report;
-  page.value = data;
-  session.value = touchEntries.value[0]?.index ?? 0;
-  stale.value = false;
-  return data.report;
+// The RMSE of the given model in a serialized Report: data[entry].initial.rmse.
+function errorIn(report: Uint8Array, entry: number): number {
+  const inside = (message: Uint8Array, wanted: number) => [...fieldsOf(message)].filter(({ number }) => number === wanted).map(({ bytes }) => bytes);
+  const data = inside(report, 10)[entry];
+  const quality = data && inside(data, 10)[0];
+  const rmse = quality && inside(quality, 1)[0];
+  return rmse ? double(rmse) : quality ? 0 : Number.NaN;
+}
+
+// The report of the last rung: its error at once, the views after the browser has painted it, unless a slider has moved on.
+async function show(report: Uint8Array, signal: AbortSignal): Promise<Report | null> {
+  const setError = (entry: number) => {
+    const rmse = errorIn(report, entry);
+    rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
+  };
+  setError(page.value?.words.main ?? 0);
+  const mine = (drawing = new AbortController());
+  try {
+    await painted();
+    const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal: AbortSignal.any([signal, mine.signal]) })).text());
+    signal.throwIfAborted();
+    mine.signal.throwIfAborted();
+    setError(data.words.main ?? 0);
+    page.value = data;
+    session.value = touchEntries.value[0]?.index ?? 0;
+    stale.value = false;
+    return data.report;
+  } catch (reason) {
+    if (mine.signal.aborted && !signal.aborted) return null;
+    throw reason;
+  }
 }
 
 // A hidden page paints nothing, and does not wait for it.
@@ -160,6 +179,7 @@ export function undo(): void {
 export function setValue(move: Move): void {
   const idle = !moved.value;
   moved.value = move;
+  drawing.abort();
   if (!idle && working.value?.what === byHand) return;
   stale.value = true;
   void doing(byHand, async (signal) => {

@@ -30,7 +30,7 @@ function Status() {
   if (!now) return <p class="live-status" role="status">{rungs.value.length ? "Up to date." : ""}</p>;
   return (
     <p class="live-status" role="status">
-      {typeset(now.what)}{now.stage && <> \u00b7 {typeset(now.stage)}</>} <progress max={1} value={now.done || undefined} aria-label="Progress" />
+      {typeset(now.what)}{now.stage && <> {"\u00b7"} {typeset(now.stage)}</>} <progress max={1} value={now.done || undefined} aria-label="Progress" />
       {now.cancellable && <button type="button" onClick={cancel}>Cancel</button>}
     </p>
   );
@@ -93,7 +93,7 @@ function Found() {
 }
 
 function Take({ there, effect, sign, verb }: { there: boolean; effect: string; sign: string; verb: string }) {
-  if (there) return <span class="live-there">\u2713 in the model</span>;
+  if (there) return <span class="live-there">{"\u2713"} in the model</span>;
   return <button type="button" class="main" disabled={!!working.value} onClick={() => void take(effect, sign)}>{verb} {effect}</button>;
 }
 
@@ -146,7 +146,7 @@ function Empty() {
       {place.value && !working.value && (
         <>
           <p><button type="button" class="main" onClick={() => void openExample()}>Open the example</button></p>
-          <p class="soft">576 simulated touches, and a model that lacks one effect. Nothing moves.</p>
+          <p class="soft">576 simulated touches of three objects, and a model that lacks one effect. No rig takes part.</p>
           <h2>Your own measurements</h2>
           <p>Start it with a set of them and a model:</p>
           <div class="code"><pre>touchstone workbench set.csv --model nominal.yaml --mesh-dir meshes --open</pre></div>
@@ -162,8 +162,8 @@ export function Live() {
   const addable = diagnosis.value?.steps.some((one) => !has.has(one.effect));
   return (
     <section class="live" aria-labelledby="live-title">
-      <h2 id="live-title">Workbench <small>{origin.value} \u00b7 simulated by {place.value?.source ?? ""}</small></h2>
-      <div class="row">
+      <h2 id="live-title">Workbench <small>{origin.value} {"\u00b7"} simulated by {place.value?.source ?? ""}</small></h2>
+      <div class="row live-acts">
         <button type="button" class={addable ? undefined : "main"} disabled={!!working.value} onClick={() => void diagnose()}>Find what is missing</button>
         <button type="button" disabled={rungs.value.length < 2} onClick={undo}>Undo</button>
         <button type="button" onClick={save}>Save the model</button>
