@@ -215,7 +215,7 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
       "stdin; with "
       "--server "
       "also a stored session's name")
-      ->required();
+      ->required(options->set_required);
   add_input("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own");
   add_input("--also", options->also, "FILE",
             "A file of your own effects (formulas) that compete with the catalogue, repeatable")
@@ -224,9 +224,10 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
   command->add_option("--seed", options->seed, "Seed of permutations and draws. Default: 0")->type_name("N");
   if (html)
     cli->AddOutput(command, "--html", &options->html, "Write the report as one HTML file that opens offline");
-  cli->AddOutput(command, "--json", &options->json,
-                 "Write the report as JSON; -: to stdout, in place of the report in words")
-      ->group("Output");
+  if (html || options->set_required)
+    cli->AddOutput(command, "--json", &options->json,
+                   "Write the report as JSON; -: to stdout, in place of the report in words")
+        ->group("Output");
   cli->AddSourceOptions(command);
 }
 

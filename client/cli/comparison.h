@@ -22,6 +22,7 @@ struct ComparisonOptions {
   uint64_t seed = 0;
   std::string html;
   std::string json;
+  bool set_required = true;
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
   // What goes to standard output takes the place of the report in words.
@@ -45,6 +46,9 @@ class Comparison {
 
   client::Connection& connection() { return *connection_; }
   const v1::Evidence& evidence() const { return evidence_; }
+
+  // Sends what Run would send ahead, so that evidence() is whole. Run does it by itself.
+  absl::Status SendAheadNow() { return sent_ahead_.empty() ? SendAhead() : absl::OkStatus(); }
 
   // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it. A lost server
   // is replaced by the next one, which begins anew.
@@ -76,7 +80,7 @@ absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const
 
 template <typename Response, typename Start>
 absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* bar) {
-  if (sent_ahead_.empty()) TOUCHSTONE_RETURN_IF_ERROR(SendAhead());
+  TOUCHSTONE_RETURN_IF_ERROR(SendAheadNow());
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
   const auto reader = start(&context);

@@ -25,6 +25,7 @@ void AddCommands(Cli* cli) {
   AddCompare(cli);
   AddDiagnose(cli);
   AddPropose(cli);
+  AddWorkbench(cli);
   AddSession(cli);
   AddRig(cli);
   AddToken(cli);

@@ -1,6 +1,5 @@
 // The page: its template with the report and the sentences that the terminal shows too.
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_replace.h>
 #include <nlohmann/json.hpp>
 
 #include "client/report/joint.h"
@@ -9,7 +8,6 @@
 #include "client/report/report_json.h"
 #include "client/report/words.h"
 #include "client/workbench/page.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
 
 namespace touchstone::client {
@@ -93,13 +91,9 @@ absl::StatusOr<std::string> PageData(const v1::Report& report) {
 }
 
 absl::StatusOr<std::string> HtmlReport(const v1::Report& report) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const absl::string_view page, workbench::PageTemplate());
+  TOUCHSTONE_RETURN_IF_ERROR(workbench::PageTemplate().status());
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::string data, PageData(report));
-  const size_t mark = page.find(workbench::kDataMark);
-  // "</script>" in a name must not end the element.
-  return absl::StrCat(page.substr(0, mark),
-                      absl::StrReplaceAll(EscapeInJson(data), {{"<", "\\u003c"}, {">", "\\u003e"}}),
-                      page.substr(mark + workbench::kDataMark.size()));
+  return workbench::FilledPage(data, workbench::PageReach::kNobody);
 }
 
 }  // namespace touchstone::client

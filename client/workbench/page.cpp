@@ -1,8 +1,11 @@
 #include "client/workbench/page.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include "client/workbench/page_bytes.h"
+#include "server/base/printable.h"
+#include "server/base/status.h"
 
 namespace touchstone::workbench {
 
@@ -12,6 +15,17 @@ absl::StatusOr<absl::string_view> PageTemplate() {
                                                     ". Install nodejs and npm (deploy/setup does), build "
                                                     "again where the npm registry can be reached; until "
                                                     "then --json writes the same report"));
+}
+
+absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const absl::string_view page, PageTemplate());
+  const size_t mark = page.find(kDataMark);
+  std::string head(page.substr(0, mark));
+  if (reach == PageReach::kOwnOrigin)
+    absl::StrReplaceAll({{"default-src 'none';", "default-src 'none'; connect-src 'self';"}}, &head);
+  // "</script>" in a name must not end the element.
+  return absl::StrCat(head, absl::StrReplaceAll(EscapeInJson(json), {{"<", "\\u003c"}, {">", "\\u003e"}}),
+                      page.substr(mark + kDataMark.size()));
 }
 
 }  // namespace touchstone::workbench

@@ -1,6 +1,8 @@
 // The page of the report, built from source/ by Vite and part of this program.
 #pragma once
 
+#include <string>
+
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
@@ -11,5 +13,11 @@ namespace touchstone::workbench {
 absl::StatusOr<absl::string_view> PageTemplate();
 
 inline constexpr absl::string_view kDataMark = "@TOUCHSTONE_DATA@";
+
+// Whom the page may ask: nobody, as a file, or the server that it came from.
+enum class PageReach { kNobody, kOwnOrigin };
+
+// The page with these data (JSON) inside. Nothing in them ends the element that holds them.
+absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach);
 
 }  // namespace touchstone::workbench

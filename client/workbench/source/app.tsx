@@ -6,6 +6,8 @@ import { Histograms } from "./views/compare";
 import { Explore } from "./views/explore";
 import { Commands, Head } from "./views/head";
 import { Ladder } from "./views/ladder";
+import { Live } from "./views/live";
+import { stale } from "./data/live";
 import { Photographs } from "./views/photographs";
 import { Data, Distributions, Methods, Next, Provenance } from "./views/rest";
 import { Problems, Todo } from "./views/todo";
@@ -55,6 +57,16 @@ export function App() {
         {!noName && <Unexplained />}
         <Detail /><Histograms /><Next /><Baseline /><Data /><Methods /><Provenance />
       </main>
+    </>
+  );
+}
+
+// The workbench above, the report of its model below.
+export function LiveApp() {
+  return (
+    <>
+      <div class="live-main" role={page.value ? "region" : "main"} aria-label="Workbench"><Live /></div>
+      {page.value && <div class={stale.value ? "stale" : undefined}><App /></div>}
     </>
   );
 }

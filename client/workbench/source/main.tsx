@@ -1,12 +1,20 @@
 import { render } from "preact";
-import { App } from "./app";
-import { FileSource } from "./data/load";
+import { App, LiveApp } from "./app";
+import { startLive } from "./data/live";
+import { FileSource, isLive } from "./data/load";
 import { followHash, page, session, touchEntries } from "./state";
 import "./style.css";
 
 const place = document.getElementById("page")!;
 
 async function start(): Promise<void> {
+  if (isLive()) {
+    document.title = "Touchstone workbench";
+    place.replaceChildren();
+    render(<LiveApp />, place);
+    await startLive();
+    return;
+  }
   try {
     page.value = await new FileSource().load();
   } catch (reason) {

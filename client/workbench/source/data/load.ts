@@ -1,4 +1,4 @@
-// Where the page's data come from. A file carries them in a <script>; a live workbench will answer them by another Source.
+// Where the page's data come from. A file carries them in a <script>; of a live workbench (live.ts) that says so.
 import type { PageData, Report } from "./report";
 
 export interface Source { load(): Promise<PageData> }
@@ -25,6 +25,9 @@ export function parsePageData(text: string): PageData {
   withNumbers(data.report, "");
   return data;
 }
+
+// What client/workbench_server puts in the place of a report.
+export const isLive = () => document.getElementById("touchstone-data")?.textContent?.trim() === '{"live":true}';
 
 export class FileSource implements Source {
   async load(): Promise<PageData> {

@@ -1,0 +1,215 @@
+// The live workbench: the same page data as a file's, made anew from the evidence and the model as it is edited.
+import { computed, signal } from "@preact/signals";
+import type { Report } from "./report";
+import { parsePageData } from "./load";
+import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import { download } from "../charts/export";
+import { page, session, touchEntries } from "../state";
+
+export interface Parameter { name: string; unit: string; lower: number; upper: number; typical: number; neutral: number; meaning: string; values: number[] }
+export interface ModelEffect { name: string; per_object: boolean; editable: boolean; parameters: Parameter[] }
+export interface Model { yaml: string; hash: string; name: string; effects: ModelEffect[] }
+export interface Rung { name: string; model: Model; rmse: number }
+
+export const live = signal(false);
+export const place = signal<{ evidence: boolean; origin: string; source: string } | null>(null);
+export const origin = signal("");
+export const rungs = signal<Rung[]>([]); // the given model, then one per change
+export const diagnosis = signal<Report | null>(null);
+export const working = signal<{ what: string; stage: string; done: number; cancellable: boolean } | null>(null);
+// Who does not answer: the workbench itself, or the server that it asks.
+export type Lost = "workbench" | "server" | null;
+export const failure = signal<{ message: string; lost: Lost; again: () => void } | null>(null);
+export const model = computed(() => rungs.value[rungs.value.length - 1]?.model ?? null);
+// What is shown below is of another model than the last one.
+export const stale = signal(false);
+// A slider's value that the model has not taken yet.
+export interface Move { effect: ModelEffect; parameter: number; entry: number; value: number }
+export const moved = signal<Move | null>(null);
+
+let token = "";
+let evidence: Uint8Array = new Uint8Array(0);
+let running = new AbortController();
+let drawing = new AbortController(); // of the views
+let saved = ""; // the model that was saved last
+export const byHand = "values by hand"; // the rung of the sliders
+
+const unavailable = 14; // grpc::StatusCode
+
+async function local(path: string, init: RequestInit = {}): Promise<Response> {
+  const response = await request(`/local/${path}`, init, token);
+  if (!response.ok) throw new CallError(3, (await response.text()).trim());
+  return response;
+}
+
+// One thing at a time: what is asked last cancels what is under way.
+async function doing(what: string, act: (signal: AbortSignal) => Promise<void>, cancellable = false): Promise<void> {
+  running.abort();
+  if (what !== byHand) moved.value = null;
+  const mine = (running = new AbortController());
+  working.value = { what, stage: "", done: 0, cancellable };
+  failure.value = null;
+  try {
+    await act(mine.signal);
+  } catch (reason) {
+    if (mine.signal.aborted) return;
+    const lost = reason instanceof Disconnected ? "workbench" : reason instanceof CallError && reason.code === unavailable ? "server" : null;
+    failure.value = { message: (reason as Error).message, lost, again: () => void doing(what, act, cancellable) };
+  } finally {
+    if (running === mine) working.value = null;
+  }
+}
+
+// Compare or Diagnose with this model; the report's bytes.
+async function ask(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
+  let report: Uint8Array | null = null;
+  // A field that comes again wins: the model of the evidence is replaced, the rest stays as it came.
+  const asked = field(1, joined(evidence, field(3, field(3, yaml))));
+  await call(`Diagnosis/${method}`, asked, token, signal, (message) => {
+    for (const { number, bytes } of fieldsOf(message)) {
+      if (number === 2) { report = bytes.slice(); continue; }
+      const progress = { stage: "", done: 0 };
+      for (const part of fieldsOf(bytes)) if (part.number === 1) progress.stage = text(part.bytes); else if (part.number === 2) progress.done = double(part.bytes);
+      if (working.value) working.value = { ...working.value, ...progress };
+    }
+  });
+  if (!report) throw new Error("the answer has no report");
+  return report;
+}
+
+// The RMSE of the given model in a serialized Report: data[entry].initial.rmse.
+function errorIn(report: Uint8Array, entry: number): number {
+  const inside = (message: Uint8Array, wanted: number) => [...fieldsOf(message)].filter(({ number }) => number === wanted).map(({ bytes }) => bytes);
+  const data = inside(report, 10)[entry];
+  const quality = data && inside(data, 10)[0];
+  const rmse = quality && inside(quality, 1)[0];
+  return rmse ? double(rmse) : quality ? 0 : Number.NaN;
+}
+
+// The report of the last rung: its error at once, the views after the browser has painted it, unless a slider has moved on.
+async function show(report: Uint8Array, signal: AbortSignal): Promise<Report | null> {
+  const setError = (entry: number) => {
+    const rmse = errorIn(report, entry);
+    rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
+  };
+  setError(page.value?.words.main ?? 0);
+  const mine = (drawing = new AbortController());
+  try {
+    await painted();
+    const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal: AbortSignal.any([signal, mine.signal]) })).text());
+    signal.throwIfAborted();
+    mine.signal.throwIfAborted();
+    setError(data.words.main ?? 0);
+    page.value = data;
+    session.value = touchEntries.value[0]?.index ?? 0;
+    stale.value = false;
+    return data.report;
+  } catch (reason) {
+    if (mine.signal.aborted && !signal.aborted) return null;
+    throw reason;
+  }
+}
+
+// A hidden page paints nothing, and does not wait for it.
+const painted = () => new Promise<void>((done) => {
+  if (document.hidden) return done();
+  requestAnimationFrame(() => setTimeout(done));
+});
+
+async function change(of: Record<string, unknown>): Promise<Model> {
+  return (await local("model", { method: "POST", body: JSON.stringify(of) })).json() as Promise<Model>;
+}
+
+const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
+
+async function open(path: string, what: string): Promise<void> {
+  await doing(what, async (signal) => {
+    evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
+    let yaml = "";
+    for (const { number, bytes } of fieldsOf(evidence)) {
+      if (number === 7) origin.value = text(bytes);
+      if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
+    }
+    const given = await change({ yaml, change: "none" });
+    saved = given.yaml;
+    rungs.value = [{ name: given.name, model: given, rmse: Number.NaN }];
+    diagnosis.value = null;
+    await compareLast(signal);
+  });
+}
+
+export const openExample = () => open("evidence?example", "Making the example");
+
+export const diagnose = () => doing("Looking for what is missing", async (signal) => {
+  diagnosis.value = await show(await ask("Diagnose", model.value!.yaml, signal), signal);
+}, /*cancellable=*/true);
+
+// Ends what is under way; what is shown stays.
+export function cancel(): void {
+  running.abort();
+  working.value = null;
+}
+
+export function save(): void {
+  saved = model.value!.yaml;
+  download(`${model.value!.name || "model"}.yaml`, "text/yaml", saved);
+}
+
+export function take(effect: string, sign: string): Promise<void> {
+  const before = rungs.value; // tried again, it is added once
+  const asked = { yaml: model.value!.yaml, change: "take", effect, from: diagnosis.value!.improved_model_yaml };
+  return doing(`${sign} ${effect}`, async (signal) => {
+    const next = await change(asked);
+    signal.throwIfAborted();
+    rungs.value = [...before, { name: `${sign} ${effect}`, model: next, rmse: Number.NaN }];
+    stale.value = true;
+    await compareLast(signal);
+  });
+}
+
+export function undo(): void {
+  if (rungs.value.length < 2) return;
+  rungs.value = rungs.value.slice(0, -1);
+  stale.value = true;
+  void doing("Back to the model before", compareLast);
+}
+
+// A slider's value. Values that come while one is compared wait, and the last of them is the next: the error follows a slider
+// that moves all the time. All of them are one rung, which Undo takes away.
+export function setValue(move: Move): void {
+  const idle = !moved.value;
+  moved.value = move;
+  drawing.abort();
+  if (!idle && working.value?.what === byHand) return;
+  stale.value = true;
+  void doing(byHand, async (signal) => {
+    do {
+      if (moved.value) await takeValue(moved.value, signal);
+      await compareLast(signal);
+    } while (moved.value);
+  });
+}
+
+async function takeValue(move: Move, signal: AbortSignal): Promise<void> {
+  const { effect, parameter, entry, value } = move;
+  const assignments = effect.parameters.map((one, p) => `${one.name}=${one.values.map((old, i) => (p === parameter && i === entry ? value : old)).join(",")}`);
+  const next = await change({ yaml: model.value!.yaml, change: "set", effect: effect.name, assignments });
+  signal.throwIfAborted();
+  const last = rungs.value[rungs.value.length - 1];
+  const again = last.name === byHand;
+  rungs.value = [...(again ? rungs.value.slice(0, -1) : rungs.value), { name: byHand, model: next, rmse: again ? last.rmse : Number.NaN }];
+  if (moved.value === move) moved.value = null;
+}
+
+export async function startLive(): Promise<void> {
+  live.value = true;
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given) {
+    sessionStorage.setItem("token", given);
+    history.replaceState(null, "", location.pathname);
+  }
+  token = given ?? sessionStorage.getItem("token") ?? "";
+  await doing("Connecting", async (signal) => { place.value = await (await local("state", { signal })).json(); });
+  addEventListener("beforeunload", (event) => { if (model.value && model.value.yaml !== saved) event.preventDefault(); });
+  if (place.value?.evidence) await open("evidence", "Comparing");
+}

@@ -1,0 +1,58 @@
+#include "client/workbench_server/example.h"
+
+#include <vector>
+
+#include "client/source/connection.h"
+#include "client/source/measurement_csv.h"
+#include "server/base/status.h"
+#include "server/effects/all_effects.h"
+#include "server/model/model.h"
+
+namespace touchstone::workbench {
+namespace {
+
+constexpr uint64_t kSeed = 7;
+constexpr int kTouchesPerObject = 192;  // 6 faces, 8 poses, 4 rounds
+
+}  // namespace
+
+absl::StatusOr<v1::Evidence> ExampleEvidence() {
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model known, model::AddEffect(model::NominalModel(), "gaussian_noise",
+                                                                   {"sigma_us=5000"}, effects::Catalogue()));
+  known.name = "example";
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model hidden,
+                              model::AddEffect(known, "tip_radius", {"radius_mm=2"}, effects::Catalogue()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, client::Connection::Open({}));
+  std::vector<client::MeasuredTouch> touches;
+  for (const char* object : {"lat00", "lat10", "lat20"}) {
+    v1::ExpandPlanRequest plan;
+    plan.set_object(object);
+    plan.mutable_plan()->mutable_faces();
+    plan.set_count(kTouchesPerObject);
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ExpandPlanResponse planned,
+                                connection->Call(&v1::Source::Stub::ExpandPlan, plan));
+    v1::TouchRequest request;
+    request.set_object(object);
+    request.mutable_model()->set_yaml(model::FormatModel(hidden));
+    request.set_seed(kSeed);
+    request.set_first_index(touches.size());
+    *request.mutable_touches() = planned.touches();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchResponse made,
+                                connection->Call(&v1::Source::Stub::Touch, request));
+    for (int i = 0; i < planned.touches_size(); ++i) {
+      client::MeasuredTouch touch;
+      touch.touch = touches.size();
+      touch.object = object;
+      touch.commanded = planned.touches(i);
+      touch.time_s.assign(made.results(i).contact_time_s().begin(), made.results(i).contact_time_s().end());
+      touches.push_back(std::move(touch));
+    }
+  }
+  v1::Evidence evidence;
+  evidence.set_csv(client::FormatMeasurements(touches));
+  evidence.mutable_model()->set_yaml(model::FormatModel(known));
+  evidence.set_origin("the example");
+  return evidence;
+}
+
+}  // namespace touchstone::workbench

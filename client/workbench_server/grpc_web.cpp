@@ -1,0 +1,131 @@
+#include "client/workbench_server/grpc_web.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/escaping.h>
+#include <absl/strings/match.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/strip.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+namespace touchstone::workbench {
+namespace {
+
+constexpr size_t kHeadBytes = 5;  // flags, and the length in network order
+constexpr uint8_t kCompressed = 0x01, kTrailers = 0x80;
+
+std::string Frame(uint8_t flags, absl::string_view content) {
+  const auto size = static_cast<uint32_t>(content.size());
+  std::string frame;
+  frame.reserve(kHeadBytes + content.size());
+  frame += static_cast<char>(flags);
+  for (int shift = 24; shift >= 0; shift -= 8) frame += static_cast<char>(size >> shift & 0xff);
+  frame.append(content.data(), content.size());
+  return frame;
+}
+
+const std::vector<std::string>& BridgedMethods() {
+  static const std::vector<std::string> methods = {
+      "Diagnosis/Compare", "Diagnosis/Diagnose",  "Diagnosis/Propose",    "Models/ListEffects",
+      "Models/ListModels", "Models/GetModel",     "Source/Describe",      "Source/ListObjects",
+      "Source/ExpandPlan", "Sessions/GetSession", "Sessions/ListSessions"};
+  return methods;
+}
+
+}  // namespace
+
+bool IsGrpcWebType(absl::string_view content_type) {
+  const std::string type =
+      absl::AsciiStrToLower(absl::StripAsciiWhitespace(content_type.substr(0, content_type.find(';'))));
+  return type == "application/grpc-web" || type == kGrpcWebType;
+}
+
+absl::StatusOr<absl::string_view> OneMessage(absl::string_view body) {
+  if (body.size() < kHeadBytes)
+    return absl::InvalidArgumentError(absl::StrCat("gRPC-Web: the body has ", body.size(),
+                                                   " bytes; a frame of 5 bytes and a message was expected"));
+  const auto byte = [&](size_t i) { return static_cast<uint8_t>(body[i]); };
+  if (byte(0) == kCompressed)
+    return absl::UnimplementedError(
+        "gRPC-Web: the message is compressed; send it as it is (grpc-encoding: identity)");
+  if (byte(0) != 0)
+    return absl::InvalidArgumentError(
+        absl::StrCat("gRPC-Web: the first frame has the flags ", byte(0), "; a message (0) was expected"));
+  const uint64_t size = uint64_t{byte(1)} << 24 | byte(2) << 16 | byte(3) << 8 | byte(4);
+  const uint64_t there = body.size() - kHeadBytes;
+  if (size != there)
+    return absl::InvalidArgumentError(absl::StrCat("gRPC-Web: the frame says ", size, " bytes and ", there,
+                                                   " follow; exactly one message was expected"));
+  return body.substr(kHeadBytes);
+}
+
+std::string MessageFrame(absl::string_view message) {
+  return Frame(0, message);
+}
+
+std::string HeaderValue(const std::string& name, absl::string_view value) {
+  if (!absl::EndsWith(name, "-bin")) return std::string(value);
+  return std::string(absl::StripSuffix(absl::StripSuffix(absl::Base64Escape(value), "="), "="));
+}
+
+std::string TrailersFrame(const grpc::Status& status, const Metadata& metadata) {
+  std::string text = absl::StrCat("grpc-status: ", static_cast<int>(status.error_code()), "\r\n");
+  if (!status.error_message().empty())
+    absl::StrAppend(&text, "grpc-message: ", PercentEncoded(status.error_message()), "\r\n");
+  for (const auto& [key, value] : metadata) {
+    const std::string name(key.data(), key.size());
+    absl::StrAppend(&text, name, ": ", HeaderValue(name, {value.data(), value.size()}), "\r\n");
+  }
+  return Frame(kTrailers, text);
+}
+
+std::string PercentEncoded(absl::string_view text) {
+  std::string encoded;
+  for (const char c : text) {
+    if (c >= ' ' && c <= '~' && c != '%')
+      encoded += c;
+    else
+      absl::StrAppend(&encoded, "%", absl::AsciiStrToUpper(absl::BytesToHexString({&c, 1})));
+  }
+  return encoded;
+}
+
+std::optional<std::chrono::nanoseconds> ParseTimeout(absl::string_view text) {
+  constexpr size_t kMaxDigits = 8;
+  uint64_t count = 0;
+  if (text.size() < 2 || text.size() > kMaxDigits + 1 || !absl::ascii_isdigit(text[0]) ||
+      !absl::SimpleAtoi(text.substr(0, text.size() - 1), &count))
+    return std::nullopt;
+  switch (text.back()) {
+    case 'H':
+      return std::chrono::hours(std::min<uint64_t>(count, 100'000));
+    case 'M':
+      return std::chrono::minutes(std::min<uint64_t>(count, 6'000'000));
+    case 'S':
+      return std::chrono::seconds(count);
+    case 'm':
+      return std::chrono::milliseconds(count);
+    case 'u':
+      return std::chrono::microseconds(count);
+    case 'n':
+      return std::chrono::nanoseconds(count);
+    default:
+      return std::nullopt;
+  }
+}
+
+absl::Status CheckMethod(absl::string_view path) {
+  absl::string_view method = path;
+  const bool ours = absl::ConsumePrefix(&method, "/touchstone.v1.");
+  const std::vector<std::string>& bridged = BridgedMethods();
+  if (ours && std::find(bridged.begin(), bridged.end(), method) != bridged.end()) return absl::OkStatus();
+  return absl::PermissionDeniedError(absl::StrCat(
+      path, " is not open to the page, which reads, compares and diagnoses (", absl::StrJoin(bridged, ", "),
+      "); what moves a rig or changes what a server keeps is asked for by the command line"));
+}
+
+}  // namespace touchstone::workbench

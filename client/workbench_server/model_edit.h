@@ -1,0 +1,19 @@
+// Changes of a model on the page, by the functions that `touchstone model` calls.
+#pragma once
+
+#include <string>
+
+#include <absl/status/statusor.h>
+
+namespace touchstone::workbench {
+
+// `request` is JSON: {"yaml": MODEL, "change": ..., "effect": NAME, ...} with the change
+//   "none"             nothing
+//   "take"             the effect as the model "from" has it, for instance a report's improved model
+//   "set"              the effect with "assignments", ["radius_mm=2.5"], in place of the one that is there
+//   "remove"           the effect
+// The answer: {"yaml", "hash", "name", "effects": [{"name", "parameters": [{"name", "unit", "values": [..]}]}]}, values in the
+// units of files. INVALID_ARGUMENT says what is wrong with the request or the model.
+absl::StatusOr<std::string> ChangeModel(const std::string& request);
+
+}  // namespace touchstone::workbench

@@ -1,0 +1,69 @@
+#include "client/workbench_server/request_guard.h"
+
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <openssl/crypto.h>
+#include <openssl/rand.h>
+
+#include "server/base/check.h"
+#include "server/base/printable.h"
+
+namespace touchstone::workbench {
+namespace {
+
+constexpr size_t kTokenBytes = 16;
+constexpr size_t kMaxShown = 100;  // of a header, in a message
+
+std::string Text(boost::beast::string_view value) {
+  return std::string(value.data(), value.size());
+}
+
+std::string Shown(const std::string& text) {
+  return Printable(text, kMaxShown);
+}
+
+// A name of this machine that no DNS server can point elsewhere; any port, since it may be forwarded (ssh -L).
+bool IsLoopbackHost(const std::string& host) {
+  const size_t colon = host.rfind(':');
+  const bool has_port = colon != std::string::npos && host.find(']', colon) == std::string::npos;
+  const std::string name = has_port ? host.substr(0, colon) : host;
+  return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
+}
+
+}  // namespace
+
+std::string NewToken() {
+  unsigned char bytes[kTokenBytes];
+  TOUCHSTONE_CHECK(RAND_bytes(bytes, sizeof bytes) == 1);
+  return absl::BytesToHexString({reinterpret_cast<const char*>(bytes), sizeof bytes});
+}
+
+absl::Status CheckOrigin(const boost::beast::http::fields& head) {
+  using boost::beast::http::field;
+  const std::string host = Text(head[field::host]);
+  if (!IsLoopbackHost(host))
+    return absl::PermissionDeniedError(
+        absl::StrCat("the host '", Shown(host),
+                     "' is not this machine; 127.0.0.1 or localhost was expected, as in the "
+                     "address that touchstone workbench printed"));
+  const auto origin = head.find(field::origin);
+  if (origin != head.end() && Text(origin->value()) != "http://" + host)
+    return absl::PermissionDeniedError(absl::StrCat("a page of '", Shown(Text(origin->value())),
+                                                    "' asks; only the page at http://", host, " may"));
+  const std::string site = Text(head["Sec-Fetch-Site"]);
+  if (!site.empty() && site != "same-origin" && site != "none")
+    return absl::PermissionDeniedError(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site),
+                                                    "); only the page at http://", host, " may"));
+  return absl::OkStatus();
+}
+
+absl::Status CheckToken(const boost::beast::http::fields& head, const std::string& token) {
+  const std::string shown = Text(head[kTokenHeader]);
+  if (shown.size() == token.size() && CRYPTO_memcmp(shown.data(), token.data(), token.size()) == 0)
+    return absl::OkStatus();
+  return absl::UnauthenticatedError(
+      "the token is missing or another one; open the whole address that touchstone workbench printed, with "
+      "what follows #");
+}
+
+}  // namespace touchstone::workbench
