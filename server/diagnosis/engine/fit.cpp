@@ -163,7 +163,9 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization star
   for (int iteration = 0;; ++iteration) {
     TOUCHSTONE_RETURN_IF_ERROR(search.Linearise());
     evidence = search.Evidence();
-    if (start.size() == 0 || iteration == max_iterations) break;
+    if (start.size() == 0 || iteration == max_iterations ||
+        search.DistanceLeft(evidence) < experiment.near_enough)
+      break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const GaussNewton::Step step, search.MoveAlong(evidence));
     if (!step.moved) break;
     const LaplaceEvidence after = search.Evidence();

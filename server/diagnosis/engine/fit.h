@@ -24,6 +24,8 @@ struct Experiment {
   std::function<bool()> cancelled;
   // Effects of the model, by name, whose values another experiment has settled: a search does not set them free.
   std::vector<std::string> settled;
+  // Standard errors: a fit ends where no value has farther to go; 0: by its likelihood alone.
+  double near_enough = 0;
 };
 
 struct Fit {

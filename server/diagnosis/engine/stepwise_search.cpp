@@ -38,16 +38,20 @@ bool HaveRowsForOwnValues(const ObservationModel& observations, const Parameteri
 
 }  // namespace
 
-absl::StatusOr<bool> StepwiseSearch::Accepts(const Fit& before, const Fit& after, size_t extensions,
-                                             bool rare) const {
+bool StepwiseSearch::IsLikely(const Fit& before, const Tried& tried) const {
+  const Fit& after = tried.fit;
   // So few numbers are followed by anything.
   if (experiment_.observations->rows() < rules_.min_rows_per_parameter * (after.model.size() + 1) ||
-      (rare && !HaveRowsForOwnValues(*experiment_.observations, after.model, rules_.min_rows_per_parameter)))
+      (tried.rare &&
+       !HaveRowsForOwnValues(*experiment_.observations, after.model, rules_.min_rows_per_parameter)))
     return false;
-  if (after.log_evidence - before.log_evidence < EnterNats(rare)) return false;
+  if (after.log_evidence - before.log_evidence < EnterNats(tried.rare)) return false;
   const double ratio = 2 * (after.log_likelihood - before.log_likelihood);
   const int added = std::max(after.model.size() - before.model.size(), 1);
-  if (static_cast<double>(extensions) * ChiSquaredTail(ratio, added) > rules_.family_wise_p) return false;
+  return static_cast<double>(tried.tried) * ChiSquaredTail(ratio, added) <= rules_.family_wise_p;
+}
+
+absl::StatusOr<bool> StepwiseSearch::FallsHeldOut(const Fit& before, const Fit& after, bool rare) const {
   if (rules_.min_cv_gain_std_errors > 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> had, HeldOutSquaresRefitted(experiment_, before));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> has, HeldOutSquaresRefitted(experiment_, after));
@@ -98,13 +102,12 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) con
   return best;
 }
 
-absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions,
-                              Score(explanation->fit, explanation->initial_effects));
+absl::StatusOr<std::optional<StepwiseSearch::Tried>> StepwiseSearch::BestExtension(
+    const Fit& from, int initial_effects) const {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions, Score(from, initial_effects));
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
-  absl::StatusOr<Fit> best = absl::NotFoundError("");
-  bool best_is_rare = false;
+  std::optional<Tried> best;
   int fitted = 0, fitted_rare = 0;
   size_t rare = 0;
   for (const Extension& extension : extensions) rare += extension.rare;
@@ -114,22 +117,36 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
     const bool near = extension.visible &&
                       (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
                       extension.log_evidence > extensions[0].log_evidence - kNearPrediction &&
-                      extension.log_evidence > explanation->fit.log_evidence;
+                      extension.log_evidence > from.log_evidence;
     if (!near && (extension.rare || (!unreached && !user))) continue;
     progress_(absl::StrCat("fitting ", InWords(extension)));
     (extension.rare ? fitted_rare : fitted) += near;
     TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));
-    if (best.ok() && fit.log_evidence <= best->log_evidence) continue;
-    best = std::move(fit);
-    best_is_rare = extension.rare;
+    if (best && fit.log_evidence <= best->fit.log_evidence) continue;
+    best = {std::move(fit), extension.rare ? rare : extensions.size() - rare, extension.rare};
   }
-  if (!best.ok()) return false;
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const bool accepted,
-      Accepts(explanation->fit, *best, best_is_rare ? rare : extensions.size() - rare, best_is_rare));
-  if (!accepted) return false;
-  explanation->fit = *std::move(best);
-  return true;
+  return best;
+}
+
+absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
+  Fit trial = explanation->fit;
+  bool rare = false;
+  for (int step = 0; step <= rules_.max_trial_steps; ++step) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<Tried> best,
+                                BestExtension(trial, explanation->initial_effects));
+    if (!best || !IsLikely(trial, *best)) return false;
+    trial = std::move(best->fit);
+    rare |= best->rare;
+    TOUCHSTONE_ASSIGN_OR_RETURN(bool falls, FallsHeldOut(explanation->fit, trial, rare));
+    if (step > 0)
+      falls &=
+          std::pow(HeldOutRmseByBlock(experiment_, trial), 2) <
+          (1 - rules_.min_trial_cv_gain) * std::pow(HeldOutRmseByBlock(experiment_, explanation->fit), 2);
+    if (!falls) continue;
+    explanation->fit = std::move(trial);
+    return true;
+  }
+  return false;
 }
 
 absl::StatusOr<Fit> StepwiseSearch::WithoutEffect(const Explanation& explanation, int index) const {
@@ -165,8 +182,8 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
   std::vector<CompetingFit> competing;
   competing.push_back({NameOf(own), own_per_object, own_object, false, explanation.fit});
   // The linearised prediction is good to about a share of what there is to explain.
-  const double near =
-      std::max(kNearPrediction, kPoorPrediction * (explanation.fit.log_evidence - without.log_evidence));
+  const double gain_nats = explanation.fit.log_evidence - without.log_evidence;
+  const double near = std::max(kNearPrediction, kPoorPrediction * gain_nats);
   int fitted = 0, fitted_rare = 0;
   for (const Extension& extension : extensions) {
     // A value of the model that is set free competes like any effect.
@@ -181,7 +198,10 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
     // What is known to resemble this effect, and acts where it does, is tried whatever the prediction says.
     const bool alike =
         given || (extension.object == own_object && (!extension.rare || per_object == own_per_object));
-    if (!likely && !(alike && IsDeclaredConfounded(own, extension.name))) continue;
+    const bool declared =
+        alike && IsDeclaredConfounded(own, extension.name) &&
+        extension.log_evidence - without.log_evidence >= rules_.min_declared_share * gain_nats;
+    if (!likely && !declared) continue;
     progress_(absl::StrCat("trying ", InWords(extension), " instead of ", NameOf(own)));
     (extension.rare ? fitted_rare : fitted) += likely;
     TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,13 @@ struct SearchRules {
   double complexity_penalty_nats = 11;  // of a formula term that was picked from a dictionary
   int min_rows_per_parameter = 8;       // that each fitted value needs
   int max_steps = 6;
+  // Steps that are taken on trial beyond one with which the held-out error does not fall, where what else is missing hides
+  // its gain: all of them are steps if its square falls by such a share with the last.
+  int max_trial_steps = 0;
+  double min_trial_cv_gain = 0.5;
+  // Share of what a step gains that the linearised prediction must give to another effect, declared to resemble it, for it
+  // to be fitted in the step's place.
+  double min_declared_share = 0;
   int max_refits = 6;       // candidates that are fitted in full per step
   int max_rare_refits = 4;  // ... of those that do not act on all objects alike
 };
@@ -103,7 +111,17 @@ class StepwiseSearch {
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
   absl::Status Improve(Explanation* explanation) const;  // swaps and removals, as long as there are any
-  absl::StatusOr<bool> Accepts(const Fit& before, const Fit& after, size_t extensions, bool rare) const;
+  // The extension of the fit that is best of those that are likely; `tried`: how many it was chosen from.
+  struct Tried {
+    Fit fit;
+    size_t tried = 0;
+    bool rare = false;
+  };
+  absl::StatusOr<std::optional<Tried>> BestExtension(const Fit& fit, int initial_effects) const;
+  // Whether it gains enough by the likelihood.
+  bool IsLikely(const Fit& before, const Tried& after) const;
+  // Whether rows that it did not see agree.
+  absl::StatusOr<bool> FallsHeldOut(const Fit& before, const Fit& after, bool rare) const;
   double EnterNats(bool rare) const { return rare ? rules_.enter_rare_nats : rules_.enter_nats; }
 
   const Experiment& experiment_;

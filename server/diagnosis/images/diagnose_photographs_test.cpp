@@ -123,6 +123,27 @@ TEST(DiagnosePhotographs, NamesNothingWhereTheLightFlickers) {
   EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
 }
 
+// Each of the three hides what the others take from the error: the search takes them on trial, and goes on where they lead.
+TEST(DiagnosePhotographs, FindsAWrongCameraFileBesideExposureAndLens) {
+  TOUCHSTONE_SECOND_TIER("long: whole diagnoses of pictures");
+  const std::vector<NamedValues> cameras = {{{"focal_error", {"relative=-0.04"}}},
+                                            {{"focal_error", {"relative=0.1"}}},
+                                            {{"principal_point", {"offset_px=-15,0"}}},
+                                            {{"principal_point", {"offset_px=5,20"}}}};
+  for (const NamedValues& camera : cameras) {
+    HiddenCamera rig;
+    rig.photographs = 6;
+    rig.side_px = 112;
+    rig.hidden = {camera[0], {"exposure", {"stops=0.25"}}, {"radial_distortion", {"k1=-0.15"}}};
+    const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+    EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
+    std::set<std::string> found;
+    for (const engine::LadderStep& step : d.steps) found.insert(step.effect);
+    EXPECT_EQ(found, (std::set<std::string>{camera[0].first, "exposure", "radial_distortion"}));
+    EXPECT_LT(d.final->rmse, 1.1 * d.noise_floor.sigma);
+  }
+}
+
 TEST(DiagnosePhotographs, NamesBothOfAPair) {
   TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;

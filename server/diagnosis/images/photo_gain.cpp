@@ -54,14 +54,6 @@ absl::StatusOr<double> NoiseOfPixels(const Photographs& photographs, const model
   return std::sqrt(variance / std::max(pixels, 1.0));
 }
 
-// Effects with a name that act on every object alike.
-std::vector<engine::Candidate> NamedOfRig(const std::vector<engine::Candidate>& candidates) {
-  std::vector<engine::Candidate> named;
-  for (const engine::Candidate& candidate : candidates)
-    if (!candidate.nameless && !candidate.per_object && candidate.object.empty()) named.push_back(candidate);
-  return named;
-}
-
 // One step after the other that takes most of what is left, without a smooth error of the albedo or the picture: those
 // take the place of an effect that acts everywhere, and of what lies beside it.
 class LargeSteps {

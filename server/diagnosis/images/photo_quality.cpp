@@ -20,7 +20,8 @@ constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
 constexpr double kMinRepeatPixels = 1000;
 constexpr double kContours = 1.1;  // an error so many times the floor may come from contours alone
 constexpr double kMinPlacePx2 = 1e-4;
-constexpr double kEfficiency = 0.3;  // of a pixel of the residuals' differences, as a degree of freedom
+constexpr double kHeldOutNear = 0.3;  // standard errors that a value may be off in a fit without a part
+constexpr double kEfficiency = 0.3;   // of a pixel of the residuals' differences, as a degree of freedom
 
 }  // namespace
 
@@ -130,8 +131,10 @@ void AssessByPixels(const Photographs& p, const engine::NoiseFloor& floor, engin
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
                                     const engine::Experiment& experiment, const engine::Fit& fit) {
   if (fit.model.size() == 0) return 1;
+  engine::Experiment nearly = experiment;
+  nearly.near_enough = kHeldOutNear;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<engine::RefitWithoutPart>> divisions,
-                              engine::RefitWithoutParts(experiment, fit));
+                              engine::RefitWithoutParts(nearly, fit));
   const auto squares_of = [&](const model::Model& model,
                               const std::set<int>& which) -> absl::StatusOr<double> {
     TOUCHSTONE_ASSIGN_OR_RETURN(

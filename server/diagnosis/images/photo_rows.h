@@ -29,6 +29,7 @@ struct PhotoRowsOptions {
   int smoothing = 1;                      // passes over the directions
   int max_photographs = 40;               // that the search sees
   double contour_px2 = kUnknownPlacePx2;  // variance of a contour's place
+  int max_trial_steps = 0;                // engine::SearchRules
 };
 
 class PhotoRows : public engine::ObservationModel {

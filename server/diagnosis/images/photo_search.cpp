@@ -13,11 +13,22 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr PhotoRowsOptions kCoarse = {1600, 2, 15};
+// Exposure, optics and place may all be off at once: each of them alone hides what the others take.
+constexpr int kMaxTrialSteps = 2;
+// Noise of coarse rows, over that of pixels, from where pictures may lie tens of pixels off: kFar goes before kCoarse, where
+// the image field would take a displaced object for a stain. A focal length 8 % off gives 38, a principal point 30 of 224 px
+// off 190, 15 of 112 px off 48.
+constexpr double kFarSigma = 20;
+// Of that noise, the most that what kFar has found may leave: otherwise it was no displacement.
+constexpr double kFarLeaves = 0.5;
+constexpr PhotoRowsOptions kFar = {196, 3, 15, kUnknownPlacePx2, kMaxTrialSteps};
+constexpr PhotoRowsOptions kCoarse = {1600, 2, 15, kUnknownPlacePx2, kMaxTrialSteps};
 constexpr PhotoRowsOptions kFine = {12544, 1, 30};
+constexpr int kCoarsePasses = 3;               // searches, each at what the one before has found
 constexpr double kStepP = 1e-4;                // of a step's values, with the scatter between pictures
 constexpr double kFaint = 0.1;                 // of the noise
 constexpr double kWidthStarts[] = {0.5, 1.0};  // over the typical size
+constexpr double kMinDeclaredShare = 0.1;      // engine::SearchRules: gamma in the place of exposure has 0.02
 constexpr int kMaxRefits = 4, kMaxRareRefits = 2;
 constexpr int kAnchorPasses = 5;
 constexpr double kAnchorStays =
@@ -95,14 +106,18 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
   return absl::OkStatus();
 }
 
+// Whether the explanation moves rays by more than the initial model does.
+bool MovesRaysBeyond(const engine::Explanation& explanation) {
+  const std::vector<model::EffectInstance>& effects = explanation.fit.model.base().effects;
+  return std::any_of(effects.begin() + explanation.initial_effects, effects.end(),
+                     [](const model::EffectInstance& instance) { return MovesRays(*instance.effect); });
+}
+
 // Derivatives by what moves rays are the anchor's. A value that moved contours by several pixels away from it may have
 // stopped where those derivatives no longer lead downwards: from there they are taken again, until nothing moves.
 absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& context,
                         engine::Explanation* explanation) {
-  const std::vector<model::EffectInstance>& effects = explanation->fit.model.base().effects;
-  if (std::none_of(effects.begin() + explanation->initial_effects, effects.end(),
-                   [](const model::EffectInstance& instance) { return MovesRays(*instance.effect); }))
-    return absl::OkStatus();
+  if (!MovesRaysBeyond(*explanation)) return absl::OkStatus();
   for (int pass = 0; pass < kAnchorPasses; ++pass) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const PhotoSearch there,
@@ -119,7 +134,56 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
   return absl::OkStatus();
 }
 
+// What coarse cells say. Where it moves contours far, derivatives at the given model hide what else is missing: the search
+// goes on at what it has found.
+absl::StatusOr<engine::Explanation> ExplainCoarsely(const DiagnosisInput& input,
+                                                    const Photographs& photographs,
+                                                    const std::vector<engine::Candidate>& candidates,
+                                                    const DiagnosisContext& context) {
+  engine::Explanation explanation;
+  explanation.initial_effects = static_cast<int>(input.model->effects.size());
+  model::Model anchor = *input.model;
+  const auto search = [&](const PhotoRowsOptions& options,
+                          const std::vector<engine::Candidate>& of) -> absl::StatusOr<PhotoSearch> {
+    absl::StatusOr<PhotoSearch> made = MakePhotoSearch(photographs, anchor, of, options, context);
+    if (made.ok()) made->experiment->settled = input.settled;
+    return made;
+  };
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotoSearch coarse, search(kCoarse, candidates));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      explanation.fit,
+      engine::FitModel(*coarse.experiment, engine::Parameterization(*input.model, photographs.objects)));
+  if (explanation.fit.sigma > kFarSigma) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch far, search(kFar, NamedOfRig(candidates)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation found, far.search->Continue(explanation));
+    TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &found));
+    if (MovesRaysBeyond(found) && found.fit.sigma < kFarLeaves * explanation.fit.sigma) {
+      explanation = std::move(found);
+      anchor = explanation.fit.model.base();
+      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(kCoarse, candidates));
+    }
+  }
+  for (int pass = 0; pass < kCoarsePasses; ++pass) {
+    const size_t had = explanation.fit.model.base().effects.size();
+    if (pass > 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(kCoarse, candidates));
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Continue(explanation));
+    TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &explanation));
+    anchor = explanation.fit.model.base();
+    if (anchor.effects.size() == had || !MovesRaysBeyond(explanation)) break;
+  }
+  return explanation;
+}
+
 }  // namespace
+
+std::vector<engine::Candidate> NamedOfRig(const std::vector<engine::Candidate>& candidates) {
+  std::vector<engine::Candidate> named;
+  for (const engine::Candidate& candidate : candidates)
+    if (!candidate.nameless && !candidate.per_object && candidate.object.empty()) named.push_back(candidate);
+  return named;
+}
 
 std::vector<engine::Candidate> PhotoCandidates(const DiagnosisInput& input, const Photographs& photographs) {
   std::vector<engine::Candidate> candidates;
@@ -179,6 +243,8 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   // A fit of photographs takes a second: where nothing explains them, fits of what might are most of a diagnosis.
   rules.max_refits = kMaxRefits;
   rules.max_rare_refits = kMaxRareRefits;
+  rules.min_declared_share = kMinDeclaredShare;
+  rules.max_trial_steps = options.max_trial_steps;
   made.search = std::make_unique<engine::StepwiseSearch>(*made.experiment, candidates, rules,
                                                          [](const std::string&) {});
   return made;
@@ -196,15 +262,9 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   };
   PhotoSelection selection;
   selection.initial_effects = static_cast<int>(input.model->effects.size());
-  engine::Explanation explanation;
-  {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch coarse,
-                                MakePhotoSearch(photographs, *input.model, candidates, kCoarse, context));
-    coarse.experiment->settled = input.settled;
-    TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
-    TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Run(base, selection.initial_effects));
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &explanation));
+  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation explanation,
+                              ExplainCoarsely(input, photographs, candidates, context));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
   // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is depends on the noise.
   selection.photographs = std::make_unique<Photographs>(photographs);
@@ -237,9 +297,13 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
       engine::FindCompetitors(*selection.fine.search, {selection.fit, selection.initial_effects},
                               selection.field, {}));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      selection.heldout_ratio,
-      HeldOutRatio(*selection.photographs, *selection.fine.rows, *selection.fine.experiment, selection.fit));
+  if (selection.field < 0 && !selection.rungs.empty()) {
+    selection.heldout_ratio = selection.rungs.back().heldout_ratio;  // of the same fit
+  } else {
+    TOUCHSTONE_ASSIGN_OR_RETURN(selection.heldout_ratio,
+                                HeldOutRatio(*selection.photographs, *selection.fine.rows,
+                                             *selection.fine.experiment, selection.fit));
+  }
   const engine::Likelihood& likelihood = *selection.fine.likelihood;
   const engine::Likelihood::Columns residual = likelihood.Prepare(selection.fit.columns.values.col(0));
   std::vector<double> with;

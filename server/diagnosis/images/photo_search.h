@@ -26,6 +26,9 @@ struct PhotoSearch {
 // lacks them; and the user's own.
 std::vector<engine::Candidate> PhotoCandidates(const DiagnosisInput& input, const Photographs& photographs);
 
+// Effects with a name that act on every object alike.
+std::vector<engine::Candidate> NamedOfRig(const std::vector<engine::Candidate>& candidates);
+
 absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, const model::Model& anchor,
                                             const std::vector<engine::Candidate>& candidates,
                                             const PhotoRowsOptions& options, const DiagnosisContext& context);
