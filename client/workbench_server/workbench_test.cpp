@@ -1,6 +1,7 @@
 // Over a real socket, with the real server in this process behind it.
 #include "client/workbench_server/workbench.h"
 
+#include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
 #include <boost/asio/connect.hpp>
@@ -13,6 +14,8 @@
 #include "client/workbench/page.h"
 #include "client/workbench_server/example.h"
 #include "client/workbench_server/grpc_web.h"
+#include "server/base/test_paths.h"
+#include "server/base/text.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -161,6 +164,19 @@ TEST_F(WorkbenchTest, SurvivesRequestsThatAreCutAndClientsThatLeave) {
     asio::read(gone, asio::buffer(&byte, 1));
   }
   EXPECT_TRUE(Has(Call("Models/ListEffects", MessageFrame("")), "grpc-status: 0\r\n"));
+}
+
+TEST(HttpLimits, AreThoseThatAreDocumented) {
+  const std::string page = ReadFile(SourceDir() + "/server/LIMITS.md").value_or("");
+  const HttpLimits limits;
+  const auto row = [](const char* name, double value, const char* unit) {
+    return absl::StrCat("| `", name, "` | ", value, unit, " |");
+  };
+  for (const std::string& line :
+       {row("connections", limits.connections, ""), row("head_bytes", limits.head_bytes >> 10, " KiB"),
+        row("body_bytes", static_cast<double>(limits.body_bytes >> 20), " MiB"),
+        row("head_s", limits.head_s, " s"), row("stall_s", limits.stall_s, " s")})
+    EXPECT_TRUE(Has(page, line)) << line;
 }
 
 TEST_F(WorkbenchTest, EndsACallAtItsDeadline) {
