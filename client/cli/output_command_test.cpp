@@ -299,7 +299,8 @@ TEST_F(OutputsTest, EveryOptionThatNamesAnOutputIsInTheTable) {
     std::vector<std::string> names;
     std::istringstream lines(help.substr(std::min(help.find("\nCommands:"), help.size())));
     for (std::string line; std::getline(lines, line);)
-      if (line.rfind("  ", 0) == 0) names.push_back(line.substr(2, line.find(' ', 2) - 2));
+      if (line.rfind("  ", 0) == 0 && line[2] != ' ')  // else the rest of a description
+        names.push_back(line.substr(2, line.find(' ', 2) - 2));
     return names;
   };
   const auto has_force = [&](const std::string& help) {
