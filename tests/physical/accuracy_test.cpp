@@ -6,7 +6,19 @@
 namespace touchstone {
 namespace {
 
-class Accuracy : public PhysicalTest {};
+class Accuracy : public PhysicalTest {
+ protected:
+  // Contacts lie 0.7 s apart at most: the rate of the end effector's clock is known so well that this is 14 us of them. On a
+  // machine that does other things the messages that tell the rate come later.
+  void WaitUntilClockIsKnown() {
+    WaitUntil(
+        [this] {
+          const v1::EffectorStatus& effector = RigState().effector();
+          return effector.clock_drift_uncertainty() > 0 && effector.clock_drift_uncertainty() < 20e-6;
+        },
+        "the rate of the end effector's clock is known");
+  }
+};
 
 TEST_F(Accuracy, DifferencesOfContactTimesAreRightDespiteDriftAndADelayingLine) {
   StartRig([](rig::EmulatorOptions* options) {
@@ -16,12 +28,11 @@ TEST_F(Accuracy, DifferencesOfContactTimesAreRightDespiteDriftAndADelayingLine) 
   });
   StartGateway();
   KeptLease lease(control_.get(), "client", true);
-  // Clocks come to know each other while touches are made; the first ones only warm up.
-  for (int k = 0; k < 12; ++k) {
+  WaitUntilClockIsKnown();
+  for (int k = 0; k < 6; ++k) {
     const Answer answer = Touch(lease.token(), FromAbove(0.02, k % 4), "touch " + std::to_string(k));
     ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
     const rig::TouchTruth truth = emulator_->Touches().back();
-    if (k < 6) continue;
     for (int i = 1; i < 3; ++i) {
       const double measured_s =
           answer.response.results(0).contact_time_s(i) - answer.response.results(0).contact_time_s(0);
@@ -40,10 +51,10 @@ TEST_F(Accuracy, ABouncingSwitchCostsNone) {
   });
   StartGateway();
   KeptLease lease(control_.get(), "client", true);
-  for (int k = 0; k < 6; ++k) {
+  WaitUntilClockIsKnown();
+  for (int k = 0; k < 4; ++k) {
     const Answer answer = Touch(lease.token(), FromAbove(0.02, k % 3), "touch " + std::to_string(k));
     ASSERT_TRUE(answer.status.ok()) << answer.status.error_message();
-    if (k < 2) continue;
     const rig::TouchTruth truth = emulator_->Touches().back();
     for (int i = 1; i < 3; ++i)
       EXPECT_NEAR(answer.response.results(0).contact_time_s(i) - answer.response.results(0).contact_time_s(0),
