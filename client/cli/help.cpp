@@ -1,6 +1,5 @@
 // touchstone help, version and completion: what there is, from the table of commands itself.
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include <string>
 #include <vector>
@@ -12,8 +11,6 @@
 
 namespace touchstone::cli {
 namespace {
-
-constexpr char kShell[] = "bash";
 
 // Of "rig run": that of the command below the one above it.
 absl::StatusOr<std::string> HelpOf(const CLI::App& root, const std::vector<std::string>& words) {
@@ -51,7 +48,7 @@ void AddHelp(Cli* cli) {
   help->add_option("COMMAND", *words, "Its name, word by word");
   cli->AddCommand(nullptr, "version", "Prints the version.", "touchstone version",
                   [cli] { return cli->Print(absl::StrCat("touchstone ", kVersion, "\n")); });
-  auto shell = std::make_shared<std::string>(kShell);
+  auto shell = std::make_shared<std::string>();
   CLI::App* completion =
       cli->AddCommand(nullptr, "completion", "Prints what makes a shell complete commands and options.",
                       "source <(touchstone completion bash)                    in ~/.bashrc\n"

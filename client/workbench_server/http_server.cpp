@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "client/workbench_server/request_guard.h"
+#include "server/base/tcp_listen.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -318,13 +319,8 @@ class LoopbackServer : public HttpServer {
   }
 
   beast::error_code Listen() {
-    beast::error_code error;
     const tcp::endpoint at(asio::ip::address_v4::loopback(), static_cast<uint16_t>(options_.port));
-    acceptor_.open(at.protocol(), error);
-    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor_.bind(at, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (!error) port_ = acceptor_.local_endpoint(error).port();
+    const beast::error_code error = ListenAt(at, &acceptor_, &port_);
     if (error) return error;
     Accept();
     for (int k = 0; k < kThreads; ++k) threads_.emplace_back([this] { io_.run(); });

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "server/base/tcp_listen.h"
 #include "server/service/access_options.h"
 #include "server/service/host_port.h"
 #include "server/service/metrics.h"
@@ -101,12 +102,7 @@ class StatusPages::Http {
     beast::error_code error;
     const auto found = tcp::resolver(io_).resolve(host, port, tcp::resolver::passive, error);
     if (error) return error;
-    const tcp::endpoint at = found.begin()->endpoint();
-    acceptor_.open(at.protocol(), error);
-    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
-    if (!error) acceptor_.bind(at, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (!error) port_ = acceptor_.local_endpoint(error).port();
+    error = ListenAt(found.begin()->endpoint(), &acceptor_, &port_);
     if (error) return error;
     Accept();
     // A connection is one chain of callbacks, and so is accepting.
