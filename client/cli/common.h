@@ -188,6 +188,7 @@ void AddMesh(Cli* cli);
 void AddNormalize(Cli* cli);
 void AddCompare(Cli* cli);
 void AddDiagnose(Cli* cli);
+void AddCheck(Cli* cli);
 void AddPropose(Cli* cli);
 void AddWorkbench(Cli* cli);
 void AddSession(Cli* cli);

@@ -2,10 +2,8 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <iterator>
@@ -209,7 +207,8 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
     return option;
   };
   add_input(
-      "SET", options->set, "",
+      options->set_name, options->set, "",
+      !options->set_text.empty() ? options->set_text :
       "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG files; with a "
       "touches.csv in it `compare` and `diagnose` take both), or the journal (.db) of a rig's session; -: "
       "stdin; with "
@@ -428,8 +427,7 @@ absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, 
 absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (options.ReportOnStdout()) return absl::OkStatus();
-  const bool colour = ::isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
-  return cli.Print(client::TerminalReport(report, TerminalWidth(), colour));
+  return cli.Print(client::TerminalReport(report, TerminalWidth(), ColourOnStdout()));
 }
 
 }  // namespace touchstone::cli

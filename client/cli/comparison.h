@@ -23,6 +23,7 @@ struct ComparisonOptions {
   std::string html;
   std::string json;
   bool set_required = true;
+  std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
   // What goes to standard output takes the place of the report in words.

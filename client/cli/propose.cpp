@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "client/cli/comparison.h"
+#include "client/cli/proposed_touches.h"
 #include "client/report/words.h"
-#include "client/source/measurement_csv.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/session/images_csv.h"
@@ -47,19 +47,6 @@ std::string PlanOfPhotographs(const v1::Report& report) {
     plan.photographs.push_back(std::move(row));
   }
   return session::FormatImagesCsv(plan);
-}
-
-// Proposed touches as a measurement file without times.
-std::string PlanOfTouches(const v1::Report& report) {
-  std::vector<client::MeasuredTouch> plan;
-  for (const v1::NextMeasurement& next : report.next()) {
-    client::MeasuredTouch touch;
-    touch.touch = plan.size();
-    touch.object = next.object();
-    touch.commanded = next.touch();
-    plan.push_back(std::move(touch));
-  }
-  return client::FormatMeasurements(plan);
 }
 
 // How a plan of one kind is told and written.

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace touchstone::cli {
 
@@ -19,6 +20,10 @@ int TerminalWidth() {
 
 size_t TextWidth() {
   return static_cast<size_t>(std::min(TerminalWidth(), kMaxTextWidth));
+}
+
+bool ColourOnStdout() {
+  return ::isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
 }
 
 }  // namespace touchstone::cli

@@ -1,4 +1,4 @@
-// How wide the terminal is that a command prints to.
+// The terminal that a command prints to: its width, its colours.
 #pragma once
 
 #include <cstddef>
@@ -10,5 +10,8 @@ int TerminalWidth();
 
 // The same for text, whose lines are at most 110 columns.
 size_t TextWidth();
+
+// Whether standard output is a terminal that takes colours (NO_COLOR is not set).
+bool ColourOnStdout();
 
 }  // namespace touchstone::cli

@@ -15,6 +15,9 @@ namespace touchstone::client {
 // which take no columns.
 std::string TerminalReport(const v1::Report& report, int width, bool colour);
 
+// The same of a check: what a plan can find.
+std::string TerminalCheck(const v1::Report& report, int width, bool colour);
+
 // One HTML file that opens offline: client/workbench's page with the report's data inside; nothing is fetched. An error where
 // this build has no page.
 absl::StatusOr<std::string> HtmlReport(const v1::Report& report);

@@ -162,6 +162,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddWhy(report, &out);
   AddUnexplained(report, &out);
   AddLadder(report, &out);
+  AddBlindSpots(report, &out);
   AddWhatToDo(report, &out);
   AddNext(report, &out);
   AddUnusedRows(report, &out);

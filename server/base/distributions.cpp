@@ -3,6 +3,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/gamma.hpp>
+#include <boost/math/distributions/non_central_chi_squared.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/special_functions/beta.hpp>
 
@@ -14,6 +15,20 @@ double ChiSquaredTail(double x, double degrees_of_freedom) {
 
 double ChiSquaredQuantile(double p, double degrees_of_freedom) {
   return boost::math::quantile(boost::math::chi_squared(degrees_of_freedom), p);
+}
+
+double NoncentralChiSquaredTail(double x, double degrees_of_freedom, double noncentrality) {
+  if (!(x > 0)) return 1;
+  if (!(noncentrality > 0)) return ChiSquaredTail(x, degrees_of_freedom);
+  return boost::math::cdf(boost::math::complement(
+      boost::math::non_central_chi_squared(degrees_of_freedom, noncentrality), x));
+}
+
+double NoncentralityForTail(double x, double degrees_of_freedom, double p) {
+  if (ChiSquaredTail(x, degrees_of_freedom) >= p) return 0;
+  // boost's complement of find_non_centrality takes the upper tail.
+  return boost::math::non_central_chi_squared::find_non_centrality(
+      boost::math::complement(degrees_of_freedom, x, p));
 }
 
 double StudentTail(double t, double degrees_of_freedom) {

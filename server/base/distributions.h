@@ -9,6 +9,12 @@ double ChiSquaredTail(double x, double degrees_of_freedom);
 // The value below which X lies with probability p (0 to 1, both excluded).
 double ChiSquaredQuantile(double p, double degrees_of_freedom);
 
+// P(X > x), X noncentral chi-squared: of the sum of squares of standard normal numbers whose means squared sum to
+// `noncentrality` (>= 0).
+double NoncentralChiSquaredTail(double x, double degrees_of_freedom, double noncentrality);
+// The noncentrality at which P(X > x) is p (0 to 1, both excluded); 0 where it is larger without any.
+double NoncentralityForTail(double x, double degrees_of_freedom, double p);
+
 // P(T > t), T Student's with so many degrees of freedom (> 0).
 double StudentTail(double t, double degrees_of_freedom);
 double StudentQuantile(double p, double degrees_of_freedom);

@@ -21,6 +21,18 @@ TEST(ChiSquaredQuantile, IsTheInverseOfTheTail) {
     EXPECT_NEAR(ChiSquaredTail(ChiSquaredQuantile(p, 7.5), 7.5), 1 - p, 1e-12);
 }
 
+TEST(NoncentralChiSquaredTail, OfOneDegreeOfFreedomIsTwoTailsOfAShiftedNormal) {
+  const auto above = [](double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); };
+  EXPECT_NEAR(NoncentralChiSquaredTail(9, 1, 4), above(3 - 2) + above(3 + 2), 1e-12);
+  EXPECT_EQ(NoncentralChiSquaredTail(9, 2, 0), ChiSquaredTail(9, 2));
+}
+
+TEST(NoncentralityForTail, IsTheInverseOfTheTail) {
+  for (const double values : {1.0, 3.0})
+    EXPECT_NEAR(NoncentralChiSquaredTail(17, values, NoncentralityForTail(17, values, 0.8)), 0.8, 1e-9);
+  EXPECT_EQ(NoncentralityForTail(0.01, 3, 0.8), 0);
+}
+
 TEST(StudentTail, OfOneDegreeOfFreedomIsCauchys) {
   for (const double t : {-2.0, 0.0, 1.0, 5.0})
     EXPECT_NEAR(StudentTail(t, 1), 0.5 - std::atan(t) / M_PI, 1e-14);

@@ -3,6 +3,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/photograph_reports.h"
+#include "server/diagnosis/plan_reports.h"
 #include "server/diagnosis/touch_reports.h"
 
 namespace touchstone::diagnosis {
@@ -23,6 +24,11 @@ absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_m
   if (input.set != nullptr)
     return absl::InvalidArgumentError("a plan is of one kind: propose touches or photographs, one by one");
   return ProposePhotographSet(input, max_measurements, context);
+}
+
+absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const design::PlanQuestion& question,
+                                        const DiagnosisContext& context) {
+  return CheckTouchPlan(input, question, context);
 }
 
 }  // namespace touchstone::diagnosis

@@ -2,13 +2,14 @@
 // touches and photographs of one session together. Residuals are measured minus simulated for the same command; the noise
 // floor is the error that repeats have among themselves.
 //
-// The three calls are pure functions of their input: the same input gives the same result, durations aside, whatever
+// The calls are pure functions of their input: the same input gives the same result, durations aside, whatever
 // the number of threads. They never fail because the data are poor: they say what the data can tell. They fail on
 // input that contradicts itself (an object without a mesh, other numbers of fingers).
 #pragma once
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/design/plan_check.h"
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/report/diagnosis.h"
 
@@ -24,5 +25,10 @@ absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const Di
 // apart, or improve the values where only one is left. Of touches or of photographs: INVALID_ARGUMENT for both.
 absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_measurements,
                                           const DiagnosisContext& context);
+
+// What a plan of touches would find, before it is made: Diagnosis::detectable, and `next` where touches are asked for. The
+// verdict is kNone; times of the set are not read.
+absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const design::PlanQuestion& question,
+                                        const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis

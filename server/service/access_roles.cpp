@@ -68,6 +68,8 @@ const std::vector<MethodRole>& MethodRoles() {
       {"/touchstone.v1.Diagnosis/Compare", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Diagnose", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Propose", kReader, kReader},
+      {"/touchstone.v1.Diagnosis/Check", kReader, kReader},
+      {"/touchstone.v1.Diagnosis/Explain", kReader, kReader},
       {"/touchstone.v1.Rig/GetRig", kReader, kReader},
       {"/touchstone.v1.Rig/CheckTouches", kReader, kReader},
       {"/touchstone.v1.Rig/CheckViews", kReader, kReader},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -12,6 +13,7 @@
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
@@ -21,8 +23,13 @@
 namespace touchstone::service {
 namespace {
 
-using Work = std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisInput&,
-                                                      const diagnosis::DiagnosisContext&)>;
+// What is done with the evidence, once it is read.
+struct Work {
+  std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisInput&,
+                                           const diagnosis::DiagnosisContext&)>
+      run;
+  TimesOfSet times = TimesOfSet::kNeeded;
+};
 absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diagnosis>& diagnosis) {
   if (!diagnosis.ok()) return diagnosis.status();
   return diagnosis::report::ToReport(*diagnosis);
@@ -137,8 +144,8 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
   Worker worker(
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
-                                    ReadEvidence(evidence, *resources));
-        TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work(input, how));
+                                    ReadEvidence(evidence, *resources, work.times));
+        TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work.run(input, how));
         AddProvenance(evidence, input, *resources, &report);
         return report;
       },
@@ -199,10 +206,10 @@ absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& requ
 grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                        grpc::ServerWriter<v1::CompareResponse>* writer) {
   v1::Report report;
-  const Work work = [](const diagnosis::DiagnosisInput& input,
+  const Work work = {[](const diagnosis::DiagnosisInput& input,
                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     return AsReport(touchstone::diagnosis::Compare(input, how));
-  };
+  }};
   const absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   for (const v1::DataReport& data : report.data())
     if (status.ok() && data.kind() == v1::DataReport::TOUCHES && data.initial().rmse() > 0)
@@ -222,13 +229,13 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   }
   v1::Report report;
-  const Work work = [with_surface_map = request->with_surface_map()](
+  const Work work = {[with_surface_map = request->with_surface_map()](
                         const diagnosis::DiagnosisInput& input,
                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     diagnosis::DiagnosisInput asked = input;
     asked.with_surface_map = with_surface_map;
     return AsReport(touchstone::diagnosis::Diagnose(asked, how));
-  };
+  }};
   absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
   if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);
@@ -247,7 +254,7 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
   const int photographs =
       request->photographs() == 0 ? kDefaultProposedPhotographs : static_cast<int>(request->photographs());
   const bool touches_asked = request->touches() > 0, photographs_asked = request->photographs() > 0;
-  const Work work = [=](const diagnosis::DiagnosisInput& input,
+  const Work work = {[=](const diagnosis::DiagnosisInput& input,
                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     const bool both = input.set != nullptr && input.images != nullptr;
     if (both && touches_asked && photographs_asked)
@@ -267,7 +274,29 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
                               ? "proposed from the touches alone: the photographs of the set took no part"
                               : "proposed from the photographs alone: the touches of the set took no part");
     return report;
-  };
+  }};
+  v1::Report report;
+  return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
+}
+
+grpc::Status DiagnosisService::Check(grpc::ServerContext* context, const v1::CheckRequest* request,
+                                     grpc::ServerWriter<v1::CheckResponse>* writer) {
+  const uint32_t most = resources_->options.max_proposed_touches;
+  if (request->improve() > most)
+    return ToGrpc(OverLimit("improve =", request->improve(), "max_proposed_touches", most));
+  if (!std::isfinite(request->noise_us()) || request->noise_us() < 0)
+    return ToGrpc(absl::InvalidArgumentError(
+        absl::StrCat("noise_us = ", request->noise_us(), "; a positive number of us was expected")));
+  diagnosis::design::PlanQuestion question;
+  question.sigma_s = ToSi(Unit::kMicrosecond, request->noise_us());
+  question.improve = static_cast<int>(request->improve());
+  question.find = request->find();
+  question.between = {request->between().begin(), request->between().end()};
+  const Work work = {[&question](const diagnosis::DiagnosisInput& input,
+                                 const diagnosis::DiagnosisContext& how) {
+                       return AsReport(touchstone::diagnosis::Check(input, question, how));
+                     },
+                     TimesOfSet::kNotRead};
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }

@@ -16,6 +16,8 @@ class DiagnosisService final : public v1::Diagnosis::Service {
                         grpc::ServerWriter<v1::DiagnoseResponse>*) override;
   grpc::Status Propose(grpc::ServerContext*, const v1::ProposeRequest*,
                        grpc::ServerWriter<v1::ProposeResponse>*) override;
+  grpc::Status Check(grpc::ServerContext*, const v1::CheckRequest*,
+                     grpc::ServerWriter<v1::CheckResponse>*) override;
 
  private:
   Resources* resources_;

@@ -26,10 +26,14 @@ constexpr size_t kMaxAlsoBytes = 1 << 20;
 
 absl::Status SetTouches(absl::StatusOr<session::MeasurementSet> set, diagnosis::DiagnosisInput* input) {
   TOUCHSTONE_RETURN_IF_ERROR(set.status());
-  if (set->fingers == 0)
+  input->set = std::make_shared<const session::MeasurementSet>(*std::move(set));
+  return absl::OkStatus();
+}
+
+absl::Status CheckTimes(const session::MeasurementSet* set) {
+  if (set != nullptr && set->fingers == 0)
     return absl::InvalidArgumentError(
         absl::StrCat(set->origin, ":1: has no column t_*_us: it is a plan; what was measured was expected"));
-  input->set = std::make_shared<const session::MeasurementSet>(*std::move(set));
   return absl::OkStatus();
 }
 
@@ -235,12 +239,13 @@ std::string AsModelFile(const std::string& yaml) {
 }
 
 absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& message,
-                                                       const Resources& resources) {
+                                                       const Resources& resources, TimesOfSet times) {
   diagnosis::DiagnosisInput input;
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
   TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, resources, &input));
   TOUCHSTONE_RETURN_IF_ERROR(ReadMeasurements(message, resources, &input));
+  if (times == TimesOfSet::kNeeded) TOUCHSTONE_RETURN_IF_ERROR(CheckTimes(input.set.get()));
   TOUCHSTONE_RETURN_IF_ERROR(FindSurfaces(message, resources, &input));
   return input;
 }

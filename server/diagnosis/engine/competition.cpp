@@ -12,7 +12,6 @@ namespace touchstone::diagnosis::engine {
 namespace {
 
 constexpr double kSameLikelihoodNats = 1;  // less is no difference
-constexpr double kAlike = 0.03;            // share of a response that another effect may leave out
 constexpr double kBoundTolerance = 1e-6;   // of the typical size
 constexpr double kWorthSayingNats =
     5;                          // what has no name and is not farther behind is named beside the effect

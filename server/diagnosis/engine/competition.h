@@ -14,6 +14,10 @@
 
 namespace touchstone::diagnosis::engine {
 
+// An effect acts as another one does where it leaves out no larger share of the other's response. Only its bounds stop it then,
+// and they tell the two apart no more than a belief does.
+inline constexpr double kAlike = 0.03;
+
 // Another way to explain what one step explains.
 struct CompetingEffect {
   std::string name;

@@ -102,6 +102,7 @@ class StepwiseSearch {
   // An extension fitted in full, from several starts where the response is not linear.
   absl::StatusOr<Fit> FitExtension(const Extension& extension) const;
 
+  const Experiment& experiment() const { return experiment_; }
   const SearchRules& rules() const { return rules_; }
   const ObservationModel& observations() const { return *experiment_.observations; }
   const std::vector<Candidate>& candidates() const { return candidates_; }

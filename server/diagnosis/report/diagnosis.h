@@ -11,6 +11,7 @@
 #include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/engine/detectability.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
@@ -154,6 +155,8 @@ struct Diagnosis {
   std::optional<double> p_nothing_missing;
   int hypotheses_tried = 0;
   std::vector<NextMeasurement> next;
+  // What touches like these could have shown.
+  std::vector<engine::DetectableValue> detectable;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this
