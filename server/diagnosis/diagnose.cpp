@@ -1,6 +1,7 @@
 #include "server/diagnosis/diagnose.h"
 
 #include "server/base/status.h"
+#include "server/diagnosis/explain_reports.h"
 #include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/photograph_reports.h"
 #include "server/diagnosis/plan_reports.h"
@@ -9,6 +10,10 @@
 namespace touchstone::diagnosis {
 
 absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context) {
+  if (input.other_model != nullptr &&
+      (input.images != nullptr || input.set == nullptr || !input.set->has_poses))
+    return absl::InvalidArgumentError(
+        "two models are compared on touches with poses; photographs and sets without poses take one model");
   if (input.images == nullptr) return CompareTouches(input, context);
   return input.set == nullptr ? ComparePhotographSet(input, context) : CompareJointSet(input, context);
 }
@@ -29,6 +34,11 @@ absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_m
 absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const design::PlanQuestion& question,
                                         const DiagnosisContext& context) {
   return CheckTouchPlan(input, question, context);
+}
+
+absl::StatusOr<report::Diagnosis> Explain(const DiagnosisInput& input, const std::string& effect,
+                                          const DiagnosisContext& context) {
+  return ExplainTouches(input, effect, context);
 }
 
 }  // namespace touchstone::diagnosis

@@ -7,6 +7,8 @@
 // input that contradicts itself (an object without a mesh, other numbers of fingers).
 #pragma once
 
+#include <string>
+
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/design/plan_check.h"
@@ -15,7 +17,7 @@
 
 namespace touchstone::diagnosis {
 
-// How wrong and where. The verdict is kNone.
+// How wrong and where; with a second model, of touches only, which of the two errs less. The verdict is kNone.
 absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context);
 
 // Also why, what to add, and what the error becomes.
@@ -30,5 +32,9 @@ absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_m
 // verdict is kNone; times of the set are not read.
 absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const design::PlanQuestion& question,
                                         const DiagnosisContext& context);
+
+// Why one effect (by name) is, or is not, what the model lacks: Diagnosis::explained. The verdict is kNone.
+absl::StatusOr<report::Diagnosis> Explain(const DiagnosisInput& input, const std::string& effect,
+                                          const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis

@@ -29,6 +29,8 @@ struct DiagnosisInput {
   // Part of a joint diagnosis of touches and photographs. Names of effects that are settled by both: they are no candidates,
   // and where the model has them their values stay.
   std::vector<std::string> settled;
+  // A second model that a comparison of touches is made with; null: none.
+  std::shared_ptr<const model::Model> other_model;
   // Whose errors are told as the initial ones; null: the model's.
   std::shared_ptr<const model::Model> initial_model;
   bool IsSettled(const std::string& effect) const {

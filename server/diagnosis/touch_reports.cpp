@@ -15,6 +15,7 @@
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/early_verdicts.h"
+#include "server/diagnosis/explain_reports.h"
 #include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/report/from_distributions.h"
 #include "server/diagnosis/report/from_touches.h"
@@ -224,6 +225,9 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
                                     ladder.residuals, ladder.noise_floor.sigma),
                        &diagnosis.data[0]);
   AddSentences(&diagnosis);
+  TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.detectable,
+                              engine::FindDetectable(*selection.search, selection.fit, selection.initial_effects,
+                                                     selection.fit.sigma));
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
   if (touches_needed > 0) {
     // So few touches say where to touch next, and no more.
@@ -272,6 +276,10 @@ absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
                          &data);
   photographs.NameGiven(&diagnosis);
   AddSentences(&diagnosis);
+  if (input.other_model != nullptr && data.initial) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(data.versus, CompareWithOther(*workspace, data));
+    diagnosis.summary = absl::StrCat(data.versus->words, " ", diagnosis.summary);
+  }
   diagnosis.duration_s = Now() - began;
   return diagnosis;
 }

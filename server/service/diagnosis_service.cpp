@@ -206,9 +206,18 @@ absl::Status SaveModel(const v1::Report& report, const v1::DiagnoseRequest& requ
 grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::CompareRequest* request,
                                        grpc::ServerWriter<v1::CompareResponse>* writer) {
   v1::Report report;
-  const Work work = {[](const diagnosis::DiagnosisInput& input,
-                       const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
-    return AsReport(touchstone::diagnosis::Compare(input, how));
+  std::shared_ptr<const model::Model> other;
+  if (request->has_other_model()) {
+    absl::StatusOr<std::shared_ptr<const model::Model>> read = FromProto(request->other_model(), *resources_);
+    if (!read.ok())
+      return ToGrpc(absl::Status(read.status().code(), absl::StrCat("other_model: ", read.status().message())));
+    other = *std::move(read);
+  }
+  const Work work = {[&other](const diagnosis::DiagnosisInput& input,
+                              const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+    diagnosis::DiagnosisInput asked = input;
+    asked.other_model = other;
+    return AsReport(touchstone::diagnosis::Compare(asked, how));
   }};
   const absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   for (const v1::DataReport& data : report.data())
@@ -297,6 +306,15 @@ grpc::Status DiagnosisService::Check(grpc::ServerContext* context, const v1::Che
                        return AsReport(touchstone::diagnosis::Check(input, question, how));
                      },
                      TimesOfSet::kNotRead};
+  v1::Report report;
+  return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
+}
+
+grpc::Status DiagnosisService::Explain(grpc::ServerContext* context, const v1::ExplainRequest* request,
+                                       grpc::ServerWriter<v1::ExplainResponse>* writer) {
+  const Work work = {[request](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
+    return AsReport(touchstone::diagnosis::Explain(input, request->effect(), how));
+  }};
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }

@@ -18,6 +18,8 @@ class DiagnosisService final : public v1::Diagnosis::Service {
                        grpc::ServerWriter<v1::ProposeResponse>*) override;
   grpc::Status Check(grpc::ServerContext*, const v1::CheckRequest*,
                      grpc::ServerWriter<v1::CheckResponse>*) override;
+  grpc::Status Explain(grpc::ServerContext*, const v1::ExplainRequest*,
+                       grpc::ServerWriter<v1::ExplainResponse>*) override;
 
  private:
   Resources* resources_;

@@ -15,15 +15,6 @@ namespace {
 constexpr int kMaxFitted = 8;       // candidates that are fitted in full
 constexpr int kMaxFittedOnOne = 3;  // ... of those that do not act on all objects alike
 
-// Whether every value of the effect ended at its neutral, usually a bound.
-bool ChangesNothing(const Fit& fit, int index) {
-  for (int i = 0; i < fit.model.size(); ++i) {
-    const FreeParameter& c = fit.model.parameters()[i];
-    if (c.effect == index && std::abs(fit.point[i] - c.neutral) > 1e-9 * c.scale) return false;
-  }
-  return true;
-}
-
 class Ranking {
  public:
   Ranking(const StepwiseSearch& search, const Fit& initial,

@@ -157,6 +157,14 @@ bool IsAtBound(const Fit& fit, int index) {
   return false;
 }
 
+bool ChangesNothing(const Fit& fit, int index) {
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const FreeParameter& p = fit.model.parameters()[i];
+    if (p.effect == index && std::abs(fit.point[i] - p.neutral) > 1e-9 * p.scale) return false;
+  }
+  return true;
+}
+
 double ProbabilityOfShare(double log_share) {
   return std::min(kMaxProbability, std::exp(log_share));
 }

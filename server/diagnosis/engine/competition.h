@@ -64,6 +64,8 @@ ExplanationsLeft FindExplanationsLeft(const Fit& fit, const std::vector<Selected
 
 // Whether a value of effect `index` ended at a bound that is not the value that changes nothing.
 bool IsAtBound(const Fit& fit, int index);
+// Whether every free value of effect `index` ended at its neutral, usually a bound.
+bool ChangesNothing(const Fit& fit, int index);
 
 // Of an explanation whose evidence has this share, as a logarithm, of the evidence of all: the one place that keeps
 // probabilities at or below kMaxProbability.

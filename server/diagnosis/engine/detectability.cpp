@@ -7,13 +7,13 @@
 #include <numeric>
 #include <set>
 
-#include "server/base/decompositions.h"
 #include "server/base/distributions.h"
 #include "server/base/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
+#include "server/diagnosis/engine/resemblance.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::engine {
@@ -245,13 +245,11 @@ class Detector {
     return rival;
   }
 
-  // Share of a response's squares that an extension's columns, with the model's own, explain: without a smooth error.
-  double ShareExplained(const Eigen::VectorXd& response, int m) const {
+  // Share of a response's squares that an extension's columns, with the model's own, explain.
+  double ShareOf(const Eigen::VectorXd& response, int m) const {
     Eigen::MatrixXd columns(response.size(), own_ + spans_[m].count);
     columns << all_.values.leftCols(own_), all_.values.middleCols(own_ + spans_[m].first, spans_[m].count);
-    for (int c = 0; c < columns.cols(); ++c) columns.col(c) /= std::max(columns.col(c).norm(), 1e-300);
-    const Eigen::VectorXd left = response - columns * SolveLeastSquaresColumns(columns, response);
-    return std::clamp(1 - left.squaredNorm() / response.squaredNorm(), 0.0, 1.0);
+    return ShareExplained(std::move(columns), response);
   }
 
   // The extension that comes nearest to a response in evidence; -1: none resembles it.
@@ -260,7 +258,7 @@ class Detector {
     for (size_t other = 0; other < extensions_.size(); ++other) {
       if (extensions_[other].name == extensions_[m].name) continue;
       if (!question_.rival.empty() && extensions_[other].name != question_.rival) continue;
-      alike.emplace_back(std::sqrt(ShareExplained(e.response, static_cast<int>(other))), other);
+      alike.emplace_back(std::sqrt(ShareOf(e.response, static_cast<int>(other))), other);
     }
     std::sort(alike.rbegin(), alike.rend());
     if (alike.size() > kRivalsCompared) alike.resize(kRivalsCompared);
@@ -277,20 +275,21 @@ class Detector {
     return nearest;
   }
 
-  // Whether nothing but a bound keeps a rival from doing what the effect does.
-  bool IsStopped(const Expected& e, int m, const FittedRival& rival) const {
+  // Whether a bound ended the way of a rival's values.
+  bool IsStopped(int m, const FittedRival& rival) const {
     const Parameterization& start = extensions_[m].start;
     bool at_bound = false;
     for (int j = own_; j < start.size(); ++j) {
       const FreeParameter& p = start.parameters()[j];
       at_bound |= rival.point[j] != p.neutral && (rival.point[j] <= p.lower || rival.point[j] >= p.upper);
     }
-    return at_bound && 1 - ShareExplained(e.response, m) < kAlike * kAlike;
+    return at_bound;
   }
 
   // How far a size is from being told apart: the squared size over the one needed; > 1: it is.
-  double ToldApart(const Expected& e, int m, const FittedRival& rival) const {
-    if (IsStopped(e, m, rival)) return 0;
+  // `alike`: nothing but a bound keeps the rival from doing what the effect does.
+  double ToldApart(const Expected& e, int m, const FittedRival& rival, bool alike) const {
+    if (alike && IsStopped(m, rival)) return 0;
     const double ahead = e.log_evidence - rival.evidence.log_evidence;
     const double likelier = std::max(e.log_likelihood - rival.evidence.log_likelihood, 0.0);
     const double occam = ahead - likelier;
@@ -357,13 +356,14 @@ class Detector {
     TOUCHSTONE_ASSIGN_OR_RETURN(const FittedRival fitted, Fitted(e.response, rival));
     value.with_rival = std::make_shared<const model::Model>(other.start.At(fitted.point));
     if (!found) return value;
-    if (ToldApart(e, rival, fitted) < 1) {
+    const bool alike = 1 - value.correlation * value.correlation < kAlike * kAlike;
+    if (ToldApart(e, rival, fitted, alike) < 1) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const bool told,
                                   Grow(m, i, reach,
                                        [&](const Expected& at) -> absl::StatusOr<double> {
                                          TOUCHSTONE_ASSIGN_OR_RETURN(const FittedRival again,
                                                                      Fitted(at.response, rival));
-                                         return ToldApart(at, rival, again);
+                                         return ToldApart(at, rival, again, alike);
                                        },
                                        &size, &e));
       if (!told) return value;

@@ -12,9 +12,11 @@
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/engine/detectability.h"
+#include "server/diagnosis/engine/effect_explanation.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/residuals/model_comparison.h"
 #include "server/diagnosis/touches/data_summary.h"
 
 namespace touchstone::diagnosis::report {
@@ -94,6 +96,22 @@ struct SetAside {
   int count() const;
 };
 
+// A second model on the same touches; the difference is in seconds, as residuals/ has it.
+struct Versus {
+  std::string other_name, other_hash;
+  Quality other;
+  residuals::ModelDifference difference;
+  std::string words;
+};
+
+// Why one effect is, or is not, what is missing; touches in seconds.
+struct Explained {
+  engine::EffectExplanation found;
+  Quality quality;
+  std::vector<residuals::DecidingTouch> speak_for, speak_against;
+  std::string words;
+};
+
 // What one kind of measurement says.
 struct DataReport {
   DataKind kind = DataKind::kTouches;
@@ -109,6 +127,8 @@ struct DataReport {
   std::vector<Quality> after_step;  // one per step of the diagnosis
   std::optional<Quality> final;     // after all steps and refits
   double reducible_share = 0;       // of the mean square error that is not noise, 0 to 1
+
+  std::optional<Versus> versus;
 
   std::vector<Slice> where;
   std::optional<Unexplained> unexplained;
@@ -157,6 +177,7 @@ struct Diagnosis {
   std::vector<NextMeasurement> next;
   // What touches like these could have shown.
   std::vector<engine::DetectableValue> detectable;
+  std::optional<Explained> explained;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this

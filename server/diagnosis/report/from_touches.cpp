@@ -7,15 +7,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-Slice SliceOf(const residuals::ErrorSlice& from) {
-  return {from.conditions,
-          from.words,
-          from.touches,
-          Microseconds(from.mean_residual_s),
-          Microseconds(from.rmse_s),
-          from.share_of_excess_error};
-}
-
 Group GroupOf(const residuals::ErrorGroup& from) {
   return {from.kind,
           from.name,
@@ -60,6 +51,15 @@ DataReport DataOfTouches(const touches::DataSummary& set) {
   for (int finger = 0; finger < set.fingers; ++finger)
     data.fingers.push_back(model::FingerName(finger, set.fingers));
   return data;
+}
+
+Slice SliceOf(const residuals::ErrorSlice& from) {
+  return {from.conditions,
+          from.words,
+          from.touches,
+          Microseconds(from.mean_residual_s),
+          Microseconds(from.rmse_s),
+          from.share_of_excess_error};
 }
 
 NoiseFloor InMicroseconds(NoiseFloor floor) {

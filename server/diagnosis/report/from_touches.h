@@ -25,6 +25,9 @@ DataProblem InMicroseconds(const engine::DataProblem& problem);
 // Verdict, causes and errors; `diagnosis` has one entry, with its initial error.
 void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis);
 
+// A part of the data, from what residuals/ found of it.
+Slice SliceOf(const residuals::ErrorSlice& from);
+
 // Where the model is wrong.
 void AddResiduals(residuals::ResidualSummary residuals, DataReport* data);
 

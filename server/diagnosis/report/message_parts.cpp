@@ -45,4 +45,19 @@ void WriteParameters(const std::vector<engine::ParameterEstimate>& parameters,
   }
 }
 
+void WriteQuality(const Quality& quality, v1::Quality* message) {
+  message->set_rmse(quality.rmse);
+  message->set_heldout_rmse(quality.heldout_rmse);
+  message->set_lack_of_fit_p(quality.lack_of_fit_p);
+}
+
+void WriteSlice(const Slice& slice, v1::Slice* message) {
+  message->set_slice(slice.conditions);
+  message->set_count(static_cast<uint32_t>(slice.count));
+  message->set_mean_residual(slice.mean_residual);
+  message->set_share_of_excess_error(slice.share_of_excess_error);
+  message->set_words(slice.words);
+  message->set_rmse(slice.rmse);
+}
+
 }  // namespace touchstone::diagnosis::report

@@ -20,4 +20,7 @@ v1::Scope ScopeMessage(engine::EffectScope scope, const std::vector<engine::Para
 void WriteParameters(const std::vector<engine::ParameterEstimate>& parameters,
                      google::protobuf::RepeatedPtrField<v1::ParameterValue>* messages);
 
+void WriteQuality(const Quality& quality, v1::Quality* message);
+void WriteSlice(const Slice& slice, v1::Slice* message);
+
 }  // namespace touchstone::diagnosis::report

@@ -36,14 +36,6 @@ Words WordsOf(DataKind kind) {
   return {"touch", "touches", "these data"};
 }
 
-// "radius_mm 1.5 +- 0.005 mm"
-std::string Value(const engine::ParameterEstimate& value) {
-  std::string name = value.name;
-  if (!value.entry.empty()) name += " " + value.entry;
-  return absl::StrFormat("%s %.4g +- %.2g%s%s", name, value.value, value.std_error,
-                         value.unit.empty() ? "" : " ", value.unit);
-}
-
 std::string NothingUsed(DataKind kind) {
   return absl::StrCat("No ", WordsOf(kind).one, " could be used: nothing can be said of the model.");
 }
@@ -192,6 +184,13 @@ void AddTouchWarnings(const DataReport& data, std::vector<std::string>* warnings
 
 }  // namespace
 
+std::string ValueInWords(const engine::ParameterEstimate& value) {
+  std::string name = value.name;
+  if (!value.entry.empty()) name += " " + value.entry;
+  return absl::StrFormat("%s %.4g +- %.2g%s%s", name, value.value, value.std_error,
+                         value.unit.empty() ? "" : " ", value.unit);
+}
+
 std::string ErrorInWords(DataKind kind, double error) {
   switch (kind) {
     case DataKind::kTouches:
@@ -209,7 +208,7 @@ std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& paramete
   constexpr int kMaxShown = 4;
   if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
   std::vector<std::string> texts;
-  for (const engine::ParameterEstimate& value : parameters) texts.push_back(Value(value));
+  for (const engine::ParameterEstimate& value : parameters) texts.push_back(ValueInWords(value));
   return absl::StrJoin(texts, ", ");
 }
 

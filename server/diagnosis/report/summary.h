@@ -24,4 +24,7 @@ std::vector<std::string> DataWarnings(const DataReport& data);
 // found elsewhere are in the model already.
 std::string Summarize(const Diagnosis& diagnosis, bool others_in_place = false);
 
+// "radius_mm 1.5 +- 0.005 mm".
+std::string ValueInWords(const engine::ParameterEstimate& value);
+
 }  // namespace touchstone::diagnosis::report

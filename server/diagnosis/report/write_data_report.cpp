@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/write_answers.h"
 #include "server/effects/formula.h"
 #include "server/model/finger_name.h"
 
@@ -30,12 +31,6 @@ const char* InWords(engine::CandidateNote note) {
       return "not among the eight most probable; its gain is a linearised prediction";
   }
   return "";
-}
-
-void WriteQuality(const Quality& quality, v1::Quality* message) {
-  message->set_rmse(quality.rmse);
-  message->set_heldout_rmse(quality.heldout_rmse);
-  message->set_lack_of_fit_p(quality.lack_of_fit_p);
 }
 
 void WriteSetAside(const SetAside& set_aside, v1::SetAside* message) {
@@ -67,18 +62,11 @@ void WriteErrors(const DataReport& data, v1::DataReport* message) {
   for (const Quality& quality : data.after_step) WriteQuality(quality, message->add_after_step());
   if (data.final) WriteQuality(*data.final, message->mutable_final());
   message->set_reducible_share(data.reducible_share);
+  if (data.versus) WriteVersus(*data.versus, data.fingers, message->mutable_versus());
 }
 
 void WriteWhere(const DataReport& data, v1::DataReport* message) {
-  for (const Slice& slice : data.where) {
-    v1::Slice* to = message->add_where();
-    to->set_slice(slice.conditions);
-    to->set_count(Unsigned(slice.count));
-    to->set_mean_residual(slice.mean_residual);
-    to->set_share_of_excess_error(slice.share_of_excess_error);
-    to->set_words(slice.words);
-    to->set_rmse(slice.rmse);
-  }
+  for (const Slice& slice : data.where) WriteSlice(slice, message->add_where());
   for (const Group& group : data.groups) {
     v1::GroupError* to = message->add_groups();
     static_assert(static_cast<int>(residuals::ErrorGroupKind::kSpeed) + 1 == v1::GroupError::SPEED);

@@ -1,9 +1,7 @@
 #include "server/diagnosis/report/write_report.h"
 
-#include <absl/strings/strip.h>
-
-#include "server/base/units.h"
 #include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/write_answers.h"
 #include "server/diagnosis/report/write_data_report.h"
 
 namespace touchstone::diagnosis::report {
@@ -71,28 +69,6 @@ void WriteNext(const images::ProposedPhotograph& proposed, v1::NextMeasurement* 
   WriteVector(proposed.camera.up, camera->mutable_up());
 }
 
-constexpr double kToldAtOnce = 1.05;  // of the size that is found
-
-void WriteDetectable(const engine::DetectableValue& value, v1::DetectableEffect* message) {
-  const model::ParameterInfo& parameter = value.effect->parameters[value.parameter];
-  message->set_effect(value.effect->name);
-  message->set_parameter(parameter.name);
-  message->set_unit(std::string(UnitSymbol(parameter.unit)));
-  message->set_finger(value.entry);
-  message->set_stage(model::StageName(value.effect->stage));
-  message->set_std_error(value.std_error);
-  message->set_typical(value.typical);
-  message->set_power_at_typical(value.power_at_typical);
-  if (value.found_from) message->set_found_from(*value.found_from);
-  message->set_rival(value.rival);
-  message->set_correlation(value.correlation);
-  if (value.told_from) message->set_told_from(*value.told_from);
-  const bool told_at_once = value.told_from && *value.told_from <= kToldAtOnce * *value.found_from;
-  if (!value.rival.empty() && value.found_from && !told_at_once)
-    message->set_parted_by(engine::DiscriminatingMeasurement(
-        {value.effect->name, std::string(absl::StripPrefix(value.rival, engine::kGivenPrefix))}));
-}
-
 void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
   for (const DataProblem& problem : diagnosis.data_problems)
     WriteDataProblem(problem, report->add_data_problems());
@@ -131,6 +107,8 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
     std::visit([&report](const auto& proposed) { WriteNext(proposed, report.add_next()); }, next);
   for (const engine::DetectableValue& value : diagnosis.detectable)
     WriteDetectable(value, report.add_detectable());
+  if (diagnosis.explained)
+    WriteExplained(*diagnosis.explained, diagnosis.data[0].fingers, report.mutable_explained());
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }

@@ -41,11 +41,13 @@ struct SliceEvidence {
 
 class SliceFinder {
  public:
+  // `less`: residuals whose squares are no excess; null: noise of sigma_s has that part.
   SliceFinder(const touches::Observations& observations, const touches::Prediction& prediction,
-              const std::vector<double>& residuals, double sigma_s)
+              const std::vector<double>& residuals, double sigma_s, const std::vector<double>* less)
       : observations_(observations),
         residuals_(residuals),
         sigma_s_(sigma_s),
+        less_(less),
         covariates_(ListResidualCovariates(observations, prediction)) {}
 
   std::vector<ErrorSlice> Find();
@@ -70,7 +72,15 @@ class SliceFinder {
 
   const touches::Observations& observations_;
   const std::vector<double>& residuals_;
+  // The excess of one finger's residual over what is no error of the model, s^2. `compared`: fingers of the touch.
+  double Excess(int k, int finger, int compared) const {
+    const size_t at = static_cast<size_t>(k) * observations_.fingers + finger;
+    const double no_error_s2 = less_ == nullptr ? NoiseShare(sigma_s_, compared) : (*less_)[at] * (*less_)[at];
+    return residuals_[at] * residuals_[at] - no_error_s2;
+  }
+
   const double sigma_s_;
+  const std::vector<double>* less_;
   const std::vector<ResidualCovariate> covariates_;
   std::vector<SliceBins> bins_;
   SliceCells cells_;
@@ -81,7 +91,7 @@ class SliceFinder {
 void SliceFinder::Collect(const std::vector<int>& touches) {
   std::vector<int> cell_touch, cell_finger;
   for (const int k : touches) {
-    const double noise_s2 = NoiseShare(sigma_s_, FingersCompared(observations_, residuals_, k));
+    const int compared = FingersCompared(observations_, residuals_, k);
     // The halves are drawn by the number of the pose, so that no order of the session can split them badly.
     const bool search = RandomBlock(0, RandomDomain::kDiagnosis, observations_.pose[k], 2, 0)[0] >> 63;
     Half& half = search ? search_ : check_;
@@ -89,9 +99,9 @@ void SliceFinder::Collect(const std::vector<int>& touches) {
       const double residual_s = residuals_[size_t(k) * observations_.fingers + i];
       if (std::isnan(residual_s)) continue;
       half.live.push_back(static_cast<int>(cells_.size()));
-      half.excess_s2 += residual_s * residual_s - noise_s2;
+      half.excess_s2 += Excess(k, i, compared);
       cells_.residual_s.push_back(residual_s);
-      cells_.excess_s2.push_back(residual_s * residual_s - noise_s2);
+      cells_.excess_s2.push_back(Excess(k, i, compared));
       pose_.push_back(observations_.pose[k]);
       cell_touch.push_back(k);
       cell_finger.push_back(i);
@@ -140,7 +150,7 @@ double SliceFinder::TotalExcess() const {
     if (!observations_.used[k] || compared < 2) continue;
     for (int i = 0; i < observations_.fingers; ++i) {
       const double residual_s = residuals_[size_t(k) * observations_.fingers + i];
-      if (!std::isnan(residual_s)) excess += residual_s * residual_s - NoiseShare(sigma_s_, compared);
+      if (!std::isnan(residual_s)) excess += Excess(k, i, compared);
     }
   }
   return excess;
@@ -163,7 +173,7 @@ ErrorSlice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_
       ++cells;
       sum += residual_s;
       squares += residual_s * residual_s;
-      excess += residual_s * residual_s - NoiseShare(sigma_s_, compared);
+      excess += Excess(k, i, compared);
     }
     touches += any;
   }
@@ -241,7 +251,14 @@ std::vector<ErrorSlice> SliceFinder::Find() {
 std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
                                    const touches::Prediction& prediction,
                                    const std::vector<double>& residuals, double sigma_s) {
-  return SliceFinder(observations, prediction, residuals, sigma_s).Find();
+  return SliceFinder(observations, prediction, residuals, sigma_s, nullptr).Find();
+}
+
+std::vector<ErrorSlice> FindSlicesBeyond(const touches::Observations& observations,
+                                         const touches::Prediction& prediction,
+                                         const std::vector<double>& residuals, const std::vector<double>& other,
+                                         double sigma_s) {
+  return SliceFinder(observations, prediction, residuals, sigma_s, &other).Find();
 }
 
 }  // namespace touchstone::diagnosis::residuals

@@ -32,4 +32,11 @@ std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
                                    const touches::Prediction& prediction,
                                    const std::vector<double>& residuals, double sigma_s);
 
+// The same of what these residuals have beyond those of another model (NaN in the same places): excess error is the sum of
+// squared residuals less that of the other's. share_of_excess_error: of the whole set's difference.
+std::vector<ErrorSlice> FindSlicesBeyond(const touches::Observations& observations,
+                                         const touches::Prediction& prediction,
+                                         const std::vector<double>& residuals, const std::vector<double>& other,
+                                         double sigma_s);
+
 }  // namespace touchstone::diagnosis::residuals

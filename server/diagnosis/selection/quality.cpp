@@ -61,13 +61,21 @@ absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engi
   return quality;
 }
 
-absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model) {
+absl::StatusOr<touches::Observations> UsableUnder(const Workspace& workspace, const model::Model& model,
+                                                  const touches::Prediction& prediction,
+                                                  const std::vector<char>& used) {
   touches::Observations o = *workspace.observations;
-  o.used = workspace.comparable;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                              workspace.predictor->Run(model, false, false));
+  o.used = used;
   LeaveOutMissed(prediction, &o);
   TOUCHSTONE_RETURN_IF_ERROR(LeaveOutEdges(*workspace.predictor, model, &o).status());
+  return o;
+}
+
+absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                              workspace.predictor->Run(model, false, false));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Observations o,
+                              UsableUnder(workspace, model, prediction, workspace.comparable));
   return touches::Rmse(o, touches::Residuals(o, prediction));
 }
 

@@ -26,6 +26,12 @@ double HeldOutRatio(const engine::Fit& fit, double heldout_rmse_s);
 absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engine::Fit& fit,
                                           const std::vector<double>& residuals);
 
+// The touches `used` ([k]) that a comparison with `model` uses too: it meets the object in them, and no edge. `prediction`:
+// of the model.
+absl::StatusOr<touches::Observations> UsableUnder(const Workspace& workspace, const model::Model& model,
+                                                  const touches::Prediction& prediction,
+                                                  const std::vector<char>& used);
+
 // What a comparison of the set with `model` finds, s: the same touches, every one of them.
 absl::StatusOr<double> ErrorAsCompared(const Workspace& workspace, const model::Model& model);
 
