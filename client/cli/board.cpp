@@ -75,7 +75,7 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   TOUCHSTONE_RETURN_IF_ERROR(CheckBoardOptions(cli, options, board));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardLayout layout,
                               boards::ParseBoardLayout(board.corners, board.square_mm));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, NominalLensModel(options.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, NominalLensModel(options.model()));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardSet set, boards::ReadBoardPictures(options.set, layout));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardDiagnosis diagnosis,
                               boards::DiagnoseBoards(set, model, options.seed));

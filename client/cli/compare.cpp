@@ -12,6 +12,8 @@ absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                               comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
                                 *request.mutable_evidence() = comparison->evidence();
+                                if (comparison->other_model())
+                                  *request.mutable_other_model() = *comparison->other_model();
                                 return comparison->connection().diagnosis().Compare(context, request);
                               }));
   return PrintReport(cli, options, report);
@@ -21,9 +23,12 @@ absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
 
 void AddCompare(Cli* cli) {
   auto options = std::make_shared<ComparisonOptions>();
+  options->most_models = 2;
   CLI::App* command = cli->AddCommand(
-      nullptr, "compare", "Says how wrong a model is against measured touches or photographs, and where.",
+      nullptr, "compare",
+      "Says how wrong a model is against measured touches or photographs, and where; of two models, which errs less.",
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
+      "touchstone compare set.csv --model nominal.yaml --model better.yaml --mesh-dir meshes   which errs less\n"
       "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq '.data[0].initial'\n"
       "touchstone compare photos --model nominal.yaml --mesh-dir meshes --html report.html",

@@ -197,6 +197,14 @@ absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
   return list;
 }
 
+// A model as the user names it; a file is read, so that errors name it.
+absl::StatusOr<v1::ModelRef> ReadModel(const std::string& text) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::ModelRef model, ParseModelRef(text));
+  if (model.has_yaml())
+    TOUCHSTONE_RETURN_IF_ERROR(model::ParseModel(model.yaml(), text, effects::Catalogue()).status());
+  return model;
+}
+
 }  // namespace
 
 void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* options, bool html) {
@@ -215,7 +223,12 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
       "--server "
       "also a stored session's name")
       ->required(options->set_required);
-  add_input("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own");
+  CLI::Option* model =
+      add_input("--model", options->models, "MODEL",
+                options->most_models > 1
+                    ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
+                    : "Model file, name or hash. Default: the source's own");
+  model->take_all()->expected(1);
   add_input("--also", options->also, "FILE",
             "A file of your own effects (formulas) that compete with the catalogue, repeatable")
       ->take_all()
@@ -249,6 +262,10 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 
 absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                                              const ComparisonOptions& options) {
+  if (static_cast<int>(options.models.size()) > options.most_models)
+    return absl::InvalidArgumentError(absl::StrCat("--model: given ", options.models.size(), " times; ",
+                                                   options.most_models == 1 ? "once" : "once or twice",
+                                                   " was expected"));
   // Said before an hour of diagnosis, not after.
   if (const absl::Status page = workbench::PageTemplate().status(); !options.html.empty() && !page.ok())
     return absl::Status(page.code(), absl::StrCat("--html: ", page.message()));
@@ -256,10 +273,11 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   v1::Evidence& evidence = comparison->evidence_;
   evidence.set_seed(options.seed);
   // Files are checked here, so that errors name them.
-  TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(), ParseModelRef(options.model));
-  if (evidence.model().has_yaml())
-    TOUCHSTONE_RETURN_IF_ERROR(
-        model::ParseModel(evidence.model().yaml(), options.model, effects::Catalogue()).status());
+  TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(),
+                              ReadModel(options.model()));
+  if (options.models.size() > 1) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(comparison->other_model_, ReadModel(options.models[1]));
+  }
   for (const std::string& path : options.also) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxTermsBytes));
     TOUCHSTONE_RETURN_IF_ERROR(

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,7 +18,8 @@ namespace touchstone::cli {
 
 struct ComparisonOptions {
   std::string set;
-  std::string model;
+  std::vector<std::string> models;  // at most `most_models`
+  int most_models = 1;
   std::vector<std::string> also;
   uint64_t seed = 0;
   std::string html;
@@ -26,6 +28,7 @@ struct ComparisonOptions {
   std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
+  std::string model() const { return models.empty() ? "" : models[0]; }
   // What goes to standard output takes the place of the report in words.
   bool ReportOnStdout() const { return IsStandardOutput(json) || IsStandardOutput(html); }
 };
@@ -47,6 +50,8 @@ class Comparison {
 
   client::Connection& connection() { return *connection_; }
   const v1::Evidence& evidence() const { return evidence_; }
+  // The second of two models, read and checked; none if one was given.
+  const std::optional<v1::ModelRef>& other_model() const { return other_model_; }
 
   // Sends what Run would send ahead, so that evidence() is whole. Run does it by itself.
   absl::Status SendAheadNow() { return sent_ahead_.empty() ? SendAhead() : absl::OkStatus(); }
@@ -68,6 +73,7 @@ class Comparison {
   const Cli& cli_;
   std::unique_ptr<client::Connection> connection_;
   v1::Evidence evidence_;
+  std::optional<v1::ModelRef> other_model_;
   std::string csv_to_send_ahead_;
   std::string sent_ahead_;                // the session's name
   std::string set_sha256_;                // of the set's file; empty: it is none here

@@ -24,6 +24,7 @@ void AddCommands(Cli* cli) {
   AddNormalize(cli);
   AddCompare(cli);
   AddDiagnose(cli);
+  AddExplain(cli);
   AddCheck(cli);
   AddPropose(cli);
   AddWorkbench(cli);

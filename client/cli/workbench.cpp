@@ -56,7 +56,7 @@ absl::Status RunWorkbench(const Cli& cli, const WorkbenchFlags& options) {
   if (options.port < 0 || options.port > kMaxPort)
     return absl::InvalidArgumentError(
         absl::StrCat("--port: ", options.port, " is out of range; 0 to ", kMaxPort));
-  if (options.set.empty() && !options.model.empty())
+  if (options.set.empty() && !options.models.empty())
     return absl::InvalidArgumentError(
         "--model: the model of what measurements? Give SET, for instance set.csv");
   std::unique_ptr<Comparison> comparison;

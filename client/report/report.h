@@ -17,6 +17,8 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour);
 
 // The same of a check: what a plan can find.
 std::string TerminalCheck(const v1::Report& report, int width, bool colour);
+// The same of an explanation: why (not) one effect.
+std::string TerminalExplanation(const v1::Report& report, int width, bool colour);
 
 // One HTML file that opens offline: client/workbench's page with the report's data inside; nothing is fetched. An error where
 // this build has no page.

@@ -34,7 +34,8 @@ std::string RivalName(const v1::DetectableEffect& value) {
 }
 
 std::string ToldFrom(const v1::DetectableEffect& value) {
-  if (!value.has_found_from() || value.rival().empty()) return "";
+  if (!value.has_found_from()) return "";
+  if (value.rival().empty()) return "at once";
   if (!value.has_told_from())
     return absl::StrCat(value.correlation() > kTied ? "never: acts as " : "never from ", RivalName(value));
   if (value.told_from() <= 1.05 * value.found_from()) return "at once";
@@ -104,12 +105,12 @@ void AddBlindSpots(const v1::Report& report, TextLayout* out) {
     if (value.power_at_typical() >= kPower) continue;
     blind.push_back(value.has_found_from()
                         ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
-                        : effect);
+                        : absl::StrCat(effect, " at any size"));
   }
   if (blind.empty()) return;
   out->Label("Blind to");
   out->Paragraph(absl::StrCat("This set could not have shown ", Join(blind, "or"),
-                              "; rigs usually show less than that."));
+                              ": rigs usually show less."));
 }
 
 std::string TerminalCheck(const v1::Report& report, int width, bool colour) {

@@ -13,6 +13,7 @@ void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);
 void AddNext(const v1::Report& report, TextLayout* out);  // touches to make, pictures to take
 void AddBlindSpots(const v1::Report& report, TextLayout* out);  // effects that the set could not have shown
+void AddVersus(const v1::Report& report, TextLayout* out);      // a comparison with a second model
 // Of photographs.
 void AddSilhouettes(const v1::Report& report, TextLayout* out);       // lines of "How wrong"
 void AddWorstPhotographs(const v1::Report& report, TextLayout* out);  // the pictures that are off most

@@ -153,6 +153,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
   AddOpening(report, &out);
   AddHowWrong(report, &out);
+  AddVersus(report, &out);
   AddDataProblems(report, &out);
   AddJoint(report, &out);
   AddDistributions(report, &out);

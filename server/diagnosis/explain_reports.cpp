@@ -30,6 +30,16 @@ std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& values) 
   return absl::StrJoin(words, ", ");
 }
 
+// ", and exclude more than 0.02 mm (95 %)": of an effect of one value that ended at its bound.
+std::string Excluded(const engine::EffectExplanation& found) {
+  if (found.parameters.size() != 1) return "";
+  const engine::ParameterEstimate& value = found.parameters[0];
+  const double limit = value.upper > value.value ? value.upper : value.lower;
+  if (limit == value.value) return "";
+  return absl::StrFormat(", and exclude %s beyond %.2g%s (95 %%)", value.name, limit,
+                         value.unit.empty() ? "" : " " + value.unit);
+}
+
 // The other effect that would gain most of those that do a part of the same.
 const engine::TakenOver* StrongestRival(const engine::EffectExplanation& found) {
   const auto rival = std::max_element(
@@ -49,14 +59,15 @@ std::string Words(const report::Explained& explained, double rmse_us) {
   if (!found.visible)
     return absl::StrCat("These touches do not depend on ", name, " at any size: they say nothing about it.");
   if (!found.changes)
-    return absl::StrCat(name, " is not what is missing: the touches fit best where it changes nothing.");
+    return absl::StrCat(name, " is not what is missing: the touches fit best where it changes nothing", Excluded(found),
+                        ".");
   const std::string best = absl::StrCat("At its best (", ValuesInWords(found.parameters), ") ", name);
   const std::string error = absl::StrCat("the RMSE goes from ", TimeInWords(kSecondsPerMicrosecond * rmse_us), " to ",
                                          TimeInWords(kSecondsPerMicrosecond * explained.quality.rmse));
   if (found.gain_nats < found.needed_nats)
     return absl::StrFormat(
-        "%s gains %.1f nats, and a search asks for %.1f: these touches do not ask for it. Sizes outside of its 95 %% "
-        "interval are excluded.",
+        "%s changes the log evidence by %+.1f nats, and a search asks for %+.1f: these touches do not ask for it. Sizes "
+        "outside of its 95 %% interval are excluded.",
         best, found.gain_nats, found.needed_nats);
   std::string words = absl::StrFormat("%s gains %.0f nats: %s.", best, found.gain_nats, error);
   const engine::TakenOver* rival = StrongestRival(found);

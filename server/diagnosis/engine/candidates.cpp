@@ -50,13 +50,15 @@ bool IsDeclaredConfounded(const model::Effect& one, const std::string& other) {
   return !DeclaredBy(one.name, name).empty() || !DeclaredBy(name, one.name).empty();
 }
 
+std::string DeclaredMeasurement(const std::string& effect, const std::string& other) {
+  const std::string text = DeclaredBy(effect, other);
+  return text.empty() ? DeclaredBy(other, effect) : text;
+}
+
 std::string DiscriminatingMeasurement(const std::vector<std::string>& names) {
   std::vector<std::string> effects;
   for (const std::string& name : names) effects.emplace_back(absl::StripPrefix(name, kGivenPrefix));
-  const auto declared = [&](size_t i, size_t j) {
-    const std::string text = DeclaredBy(effects[i], effects[j]);
-    return text.empty() ? DeclaredBy(effects[j], effects[i]) : text;
-  };
+  const auto declared = [&](size_t i, size_t j) { return DeclaredMeasurement(effects[i], effects[j]); };
   // What tells the first from each of the others; or any two of the others apart.
   std::vector<std::string> texts;
   for (size_t j = 1; j < effects.size(); ++j)

@@ -36,5 +36,7 @@ bool IsDeclaredConfounded(const model::Effect& one, const std::string& other);
 // (Effect::confounded_with). Effects of photographs of which nothing is declared are told by what checks each of them. Of
 // one effect: what tells it from nameless causes.
 std::string DiscriminatingMeasurement(const std::vector<std::string>& effects);
+// The same where the two effects declare it of each other; empty: neither does.
+std::string DeclaredMeasurement(const std::string& effect, const std::string& other);
 
 }  // namespace touchstone::diagnosis::engine

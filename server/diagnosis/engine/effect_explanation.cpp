@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/normal.h"
 #include "server/base/status.h"
+#include "server/base/units.h"
 #include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/engine/resemblance.h"
@@ -38,6 +40,30 @@ absl::Status NotAmong(const std::vector<Extension>& extensions, const std::strin
                                           absl::StrJoin(names, ", "), " was expected"));
 }
 
+// Of values that a bound holds where they change nothing: the size beyond which the likelihood falls by more than a 95 %
+// interval allows, to first order. The interval that Describe gives has no width there.
+void SetLimits(const Experiment& experiment, const Fit& fit, std::vector<ParameterEstimate>* values) {
+  const Eigen::MatrixXd gram = experiment.likelihood->Gram(fit.columns, fit.hypothesis);
+  const int index = fit.model.parameters().back().effect;
+  const std::vector<model::ParameterInfo>& parameters = fit.model.base().effects[index].effect->parameters;
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const FreeParameter& p = fit.model.parameters()[i];
+    const bool at_lower = fit.point[i] <= p.lower, at_upper = fit.point[i] >= p.upper;
+    const double information = gram(1 + i, 1 + i);
+    if (p.effect != index || p.reciprocal || at_lower == at_upper || !(information > 0)) continue;
+    const double sign = at_lower ? 1 : -1;
+    const double best = sign * gram(0, 1 + i) / information, error = fit.sigma / std::sqrt(information);
+    const double size = best + std::sqrt(best * best + std::pow(kNormalQuantile975 * error, 2));
+    const model::ParameterInfo& info = parameters[p.parameter];
+    if (info.arity != model::Arity::kScalar) continue;
+    for (ParameterEstimate& value : *values) {
+      if (value.name != info.name || value.object != p.object) continue;
+      double& end = at_lower ? value.upper : value.lower;
+      end = std::clamp(value.value + sign * FromSi(info.unit, size), info.lower, info.upper);
+    }
+  }
+}
+
 absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& search, const Fit& initial,
                                                      const std::vector<Extension>& extensions,
                                                      const EffectExplanation& explained) {
@@ -54,13 +80,15 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
                                 Derivatives(experiment, extension.start, extension.start.Start(), initial.predicted,
                                             initial.model.size()));
     const double share = ShareExplained(columns, response);
-    if (share < kWorthNaming) continue;
+    const double gain_nats = extension.log_evidence - initial.log_evidence;
+    // What gains nothing would have to act the other way.
+    if (share < kWorthNaming || !(gain_nats > 0)) continue;
     const std::string name = extension.candidate < 0 ? absl::StrCat(kGivenPrefix, extension.name) : extension.name;
     const auto same = std::find_if(taken.begin(), taken.end(), [&](const TakenOver& t) { return t.effect == name; });
     if (same == taken.end())
-      taken.push_back({name, share, extension.log_evidence - initial.log_evidence});
+      taken.push_back({name, share, gain_nats});
     else if (share > same->share)  // with a value per object
-      same->share = share, same->gain_nats = extension.log_evidence - initial.log_evidence;
+      same->share = share, same->gain_nats = gain_nats;
   }
   std::stable_sort(taken.begin(), taken.end(), [](const TakenOver& a, const TakenOver& b) { return a.share > b.share; });
   if (taken.size() > kMaxTakenOver) taken.resize(kMaxTakenOver);
@@ -86,6 +114,7 @@ absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, co
   explained.changes = !ChangesNothing(fit, index);
   explained.gain_nats = fit.log_evidence - initial.log_evidence;
   explained.parameters = fit.model.Describe(index, fit.point, fit.covariance);
+  SetLimits(search.experiment(), fit, &explained.parameters);
   // That nothing is missing, each other candidate, and this one as it was fitted.
   std::vector<double> all = {0, explained.gain_nats};
   for (const Extension& other : extensions)

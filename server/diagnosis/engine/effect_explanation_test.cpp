@@ -62,6 +62,17 @@ TEST_F(ExplainEffectTest, AnotherEffectGainsNothing) {
   EXPECT_LT(tip.probability, 0.01);
 }
 
+TEST_F(ExplainEffectTest, AValueAtItsBoundHasTheLimitThatTheRowsExclude) {
+  // A push of -0.2 mm is none: the rows exclude what lies two standard errors beyond that, and no more.
+  rows.measured = -2e-4 * rows.columns["object_push"] + rows.Random(9, kExplainSigma);
+  const EffectExplanation push = *Explain("object_push");
+  EXPECT_FALSE(push.changes);
+  EXPECT_EQ(push.parameters[0].value, 0);
+  const double error_mm = 1e3 * kExplainSigma / rows.columns["object_push"].norm();
+  EXPECT_GT(push.parameters[0].upper, 0);
+  EXPECT_LT(push.parameters[0].upper, 2 * error_mm);
+}
+
 TEST_F(ExplainEffectTest, WhatMovesNoRowIsNotVisible) {
   const EffectExplanation sag = *Explain("gravity_sag");
   EXPECT_FALSE(sag.visible);

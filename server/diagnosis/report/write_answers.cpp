@@ -42,8 +42,8 @@ void WriteDetectable(const engine::DetectableValue& value, v1::DetectableEffect*
   if (value.told_from) message->set_told_from(*value.told_from);
   const bool told_at_once = value.told_from && *value.told_from <= kToldAtOnce * *value.found_from;
   if (!value.rival.empty() && value.found_from && !told_at_once)
-    message->set_parted_by(engine::DiscriminatingMeasurement(
-        {value.effect->name, std::string(absl::StripPrefix(value.rival, engine::kGivenPrefix))}));
+    message->set_parted_by(engine::DeclaredMeasurement(
+        value.effect->name, std::string(absl::StripPrefix(value.rival, engine::kGivenPrefix))));
 }
 
 void WriteExplained(const Explained& explained, const std::vector<std::string>& fingers,
