@@ -31,7 +31,7 @@ absl::Status CheckQuestion(const CheckOptions& options) {
 
 absl::Status RunCheck(const Cli& cli, const CheckOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckQuestion(options));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CheckRequest request;
   request.set_noise_us(options.noise_us);
@@ -64,20 +64,19 @@ absl::Status RunCheck(const Cli& cli, const CheckOptions& options) {
 void AddCheck(Cli* cli) {
   auto options = std::make_shared<CheckOptions>();
   options->set_name = "PLAN";
-  options->set_text =
-      "The plan (CSV of touches with poses, as `touchstone plan` writes it), or a measurement file, whose times are not "
-      "read; -: stdin";
+  options->set_text = kPlanText;
   CLI::App* command = cli->AddCommand(
       nullptr, "check",
       "Says what a plan of touches can find before any is made: from which size each effect is found, what it is "
       "told from, and what is missed.",
       "touchstone plan lat20 -o plan.csv\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000\n"
+      "touchstone check plan.csv --model nominal.yaml --noise 5000 --html plan.html\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000 --json - | jq '.detectable[0]'\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000 --improve 24 --between tip_radius,oblique_slip \\\n"
       "  -o more.csv",
       [cli, options] { return RunCheck(*cli, *options); });
-  AddComparisonOptions(cli, command, options.get(), /*html=*/false);
+  AddComparisonOptions(cli, command, options.get(), /*html=*/true);
   command
       ->add_option("--noise", options->noise_us,
                    "Standard deviation of one finger's time, us. Default: that of the model's noise")

@@ -189,6 +189,7 @@ void AddNormalize(Cli* cli);
 void AddCompare(Cli* cli);
 void AddDiagnose(Cli* cli);
 void AddCheck(Cli* cli);
+void AddRehearse(Cli* cli);
 void AddExplain(Cli* cli);
 void AddPropose(Cli* cli);
 void AddWorkbench(Cli* cli);

@@ -16,6 +16,11 @@
 
 namespace touchstone::cli {
 
+// Of commands whose set is a plan.
+inline constexpr char kPlanText[] =
+    "The plan (CSV of touches with poses, as `touchstone plan` writes it), or a measurement file, whose times are not read; "
+    "-: stdin";
+
 struct ComparisonOptions {
   std::string set;
   std::vector<std::string> models;  // at most `most_models`

@@ -26,6 +26,7 @@ void AddCommands(Cli* cli) {
   AddDiagnose(cli);
   AddExplain(cli);
   AddCheck(cli);
+  AddRehearse(cli);
   AddPropose(cli);
   AddWorkbench(cli);
   AddSession(cli);

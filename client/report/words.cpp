@@ -309,11 +309,16 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 }
 
 std::string SummaryToShow(const v1::Report& report) {
+  if (IsOfPlan(report)) return "";  // the headline
   // Their own part says it at more length.
   if (!report.data_problems().empty()) return "";
   // Of boards it counts corners.
   const v1::DataReport& data = MainData(report);
   return data.initial().rmse() > 0 && data.kind() != v1::DataReport::BOARDS ? "" : report.summary();
+}
+
+bool IsOfPlan(const v1::Report& report) {
+  return report.verdict() == v1::Report::VERDICT_UNSPECIFIED && !report.detectable().empty();
 }
 
 std::string DataInWords(const v1::Report& report, const std::string& times) {

@@ -47,6 +47,8 @@ const v1::DataReport& MainData(const v1::Report& report);
 const v1::DataReport& DataOf(const v1::Report& report, const v1::DataProblem& problem);
 // Whether the report has errors of several kinds of measurement, or of several sessions.
 bool IsJoint(const v1::Report& report);
+// Whether the report is of a plan (touchstone check): nothing was measured.
+bool IsOfPlan(const v1::Report& report);
 // "Touches", "Photographs": a heading where there are several.
 std::string KindName(v1::DataReport::Kind kind);
 

@@ -35,7 +35,7 @@ from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
-from .report import DataReport, Quality, Report, Step, Value
+from .report import DataReport, Detectable, Explained, Quality, Report, Step, Value, Versus
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id

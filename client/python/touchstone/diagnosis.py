@@ -1,4 +1,4 @@
-"""compare(), diagnose() and propose() of a Client."""
+"""compare(), diagnose(), propose(), check() and explain() of a Client."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import grpc
 from . import checks, errors
 from .connection import Connection
 from .evidence import MeshesLike, evidence
-from .models import ModelLike
+from .models import ModelLike, model_ref
 from .report import Report
 from .retry import Retry
 from .v1 import diagnosis_pb2, diagnosis_pb2_grpc
@@ -33,9 +33,11 @@ class Diagnosis:
         self._connection = connection
 
     def compare(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
-                on_progress: OnProgress | None = None) -> Report:
-        """How wrong the model is, and where; changes nothing."""
+                other_model: ModelLike = None, on_progress: OnProgress | None = None) -> Report:
+        """How wrong the model is, and where; changes nothing. With another model, of touches: report.versus says which errs less."""
         request = diagnosis_pb2.CompareRequest(evidence=evidence(measurements, model, meshes, (), 0))
+        if other_model is not None:
+            request.other_model.CopyFrom(model_ref(other_model))
         return self._report("Compare", request, on_progress)
 
     def diagnose(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
@@ -69,6 +71,32 @@ class Diagnosis:
         if photographs is not None:
             request.photographs = checks.whole_number("photographs", photographs, 1, 2**32 - 1)
         return self._report("Propose", request, on_progress)
+
+    def check(self, plan: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
+              noise_us: float | None = None, improve: int = 0, find: str = "", between: Sequence[str] = (), seed: int = 0,
+              on_progress: OnProgress | None = None) -> Report:
+        """What a plan of touches can find before any is made: report.detectable.
+
+        Args:
+          plan: a measurement file; its times, if it has any, are not read.
+          noise_us: standard deviation of one finger's time; default: that of the model's noise.
+          improve: how many touches to propose (report.next_touches), for one of the next two questions.
+          find: an effect that is to be found at smaller sizes.
+          between: two effects that are to be told apart.
+        """
+        request = diagnosis_pb2.CheckRequest(
+            evidence=evidence(plan, model, meshes, (), seed), improve=checks.whole_number("improve", improve, 0, 2**32 - 1),
+            find=find, between=between,
+        )
+        if noise_us is not None:
+            request.noise_us = checks.positive("noise_us", noise_us)
+        return self._report("Check", request, on_progress)
+
+    def explain(self, effect: str, measurements: str | os.PathLike[str], model: ModelLike = None, *,
+                meshes: MeshesLike = None, on_progress: OnProgress | None = None) -> Report:
+        """Why one effect is, or is not, what the model lacks: report.explained. Of touches with poses."""
+        request = diagnosis_pb2.ExplainRequest(evidence=evidence(measurements, model, meshes, (), 0), effect=effect)
+        return self._report("Explain", request, on_progress)
 
     def _report(self, method: str, request: Any, on_progress: OnProgress | None) -> Report:
         """The last message of a stream; asked for again at the next source if one is lost."""

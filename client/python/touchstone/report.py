@@ -1,4 +1,4 @@
-"""What compare(), diagnose() and propose() answer."""
+"""What compare(), diagnose(), propose(), check() and explain() answer."""
 
 from __future__ import annotations
 
@@ -97,6 +97,79 @@ class Step:
     values: tuple[Value, ...]
     words: str
     shown_by: tuple[str, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Detectable:
+    """One value of an effect that the model lacks, and how well touches like these show it. Sizes are in the unit of the
+    name. pandas.DataFrame(report.detectable) is a table of them.
+
+    Attributes:
+      effect, name: "tip_radius", "radius_mm"; with its axis or finger ("offset_mm l").
+      stage: where in the simulation the effect acts.
+      std_error: what a fit leaves open; 0: these touches say nothing about the value.
+      typical, power_at_typical: what rigs usually show, and the chance that a diagnosis finds it, 0 to 1.
+      found_from: smallest size that is found in 80 % of such sets; None: none within the value's bounds.
+      rival, correlation: what resembles the effect most ("given:NAME": a value of the model's own), 0 to 1.
+      told_from: smallest size from which 80 % of such sets tell it from the rival; None: none does.
+      parted_by: what is known to tell the two apart.
+    """
+
+    effect: str
+    name: str
+    stage: str
+    std_error: float
+    typical: float
+    power_at_typical: float
+    found_from: float | None
+    rival: str
+    correlation: float
+    told_from: float | None
+    parted_by: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Explained:
+    """Why one effect is, or is not, what a model lacks.
+
+    Attributes:
+      words: a sentence or two.
+      effect, values: its name, and its best values; the interval holds what the data do not exclude.
+      gain_nats, probability: of the effect as the only one that is missing.
+      rmse, heldout_rmse: with it, in the unit of the report's data.
+      taken_over: other effects, and the share of what it does that they do as well.
+      message: all of it, touchstone.v1.ExplainedEffect.
+    """
+
+    words: str
+    effect: str
+    values: tuple[Value, ...]
+    gain_nats: float
+    probability: float
+    rmse: float
+    heldout_rmse: float
+    taken_over: dict[str, float]
+    message: diagnosis_pb2.ExplainedEffect
+
+
+@dataclasses.dataclass(frozen=True)
+class Versus:
+    """A second model on the same touches.
+
+    Attributes:
+      words: which of the two errs less.
+      other: its error, as compare() finds it.
+      rmse_difference, interval: the other's RMSE less the given model's, and its 95 % interval over poses.
+      other_better: share of the bootstrap's draws in which the other errs less.
+      message: all of it, touchstone.v1.ModelComparison.
+    """
+
+    words: str
+    other: Quality
+    rmse_difference: float
+    interval: tuple[float, float]
+    other_better: float
+    message: diagnosis_pb2.ModelComparison
 
 
 class Report:
@@ -201,6 +274,29 @@ class Report:
             for number, proposed in enumerate(one for one in self.message.next if one.HasField("touch"))
         ]
 
+    @property
+    def detectable(self) -> tuple[Detectable, ...]:
+        """What touches like these can show, one entry per value of every effect that the model lacks."""
+        return tuple(map(_detectable, self.message.detectable))
+
+    @property
+    def explained(self) -> Explained | None:
+        """Of explain()."""
+        if not self.message.HasField("explained"):
+            return None
+        e = self.message.explained
+        return Explained(e.words, e.effect, tuple(map(_value, e.parameters)), e.gain_nats, e.probability, e.rmse,
+                         e.heldout_rmse, {other.effect: other.share for other in e.taken_over}, e)
+
+    @property
+    def versus(self) -> Versus | None:
+        """Of compare() with another model."""
+        for data in self.message.data:
+            if data.HasField("versus"):
+                v = data.versus
+                return Versus(v.words, _quality(v.other), v.rmse_difference, (v.lower, v.upper), v.other_better, v)
+        return None
+
     def to_dict(self) -> dict[str, Any]:
         """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them; without the table of touches,
         which is for a page and stays in `message`."""
@@ -245,6 +341,14 @@ def _data(message: diagnosis_pb2.DataReport) -> DataReport:
         _kind(message.kind), message.unit, message.session, message.emulated, message.count, message.noise_floor,
         _quality(message.initial) if message.HasField("initial") else None, tuple(map(_quality, message.after_step)),
         _quality(message.final) if message.HasField("final") else None, message,
+    )
+
+
+def _detectable(d: diagnosis_pb2.DetectableEffect) -> Detectable:
+    return Detectable(
+        d.effect, " ".join(part for part in (d.parameter, d.finger) if part), d.stage, d.std_error, d.typical,
+        d.power_at_typical, d.found_from if d.HasField("found_from") else None, d.rival, d.correlation,
+        d.told_from if d.HasField("told_from") else None, d.parted_by,
     )
 
 

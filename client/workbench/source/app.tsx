@@ -9,12 +9,13 @@ import { Ladder } from "./views/ladder";
 import { Live } from "./views/live";
 import { stale } from "./data/live";
 import { Photographs } from "./views/photographs";
+import { Power } from "./views/power";
 import { Data, Distributions, Methods, Next, Provenance } from "./views/rest";
 import { Problems, Todo } from "./views/todo";
 import { Detail, Where } from "./views/where";
 import { Unexplained, Why } from "./views/why";
 
-const links: [string, string][] = [["ladder", "Ladder"], ["check", "Check"], ["todo", "To do"], ["where", "Where"], ["touches", "Touches"], ["photographs", "Photographs"], ["why", "Why"], ["unexplained", "Unexplained"], ["detail", "Groups"], ["histograms", "Histograms"], ["next", "Next"], ["baseline", "Baseline"], ["data", "Data"]];
+const links: [string, string][] = [["ladder", "Ladder"], ["check", "Check"], ["todo", "To do"], ["where", "Where"], ["touches", "Touches"], ["photographs", "Photographs"], ["why", "Why"], ["unexplained", "Unexplained"], ["power", "Power"], ["detail", "Groups"], ["histograms", "Histograms"], ["next", "Next"], ["baseline", "Baseline"], ["data", "Data"]];
 
 function Navigation() {
   const { report } = page.value!;
@@ -22,7 +23,7 @@ function Navigation() {
   const there: Record<string, unknown> = {
     ladder: page.value!.words.ladder.length, check: report.data_problems.length, todo: report.steps.length || report.refitted.length || report.improved_model_yaml, where: any((d) => d.where.length || d.groups.length || d.curves.length),
     touches: any((d) => d.touch_table), photographs: any((d) => d.photographs), why: any((d) => d.candidates.length), unexplained: any((d) => d.unexplained.words || d.unexplained.covariates.length || d.unexplained.formula || d.unexplained.curve),
-    detail: any((d) => d.groups.length || d.curves.length), histograms: any((d) => d.histograms.length), next: report.next.length, baseline: true, data: report.data.length,
+    power: report.detectable.length, detail: any((d) => d.groups.length || d.curves.length), histograms: any((d) => d.histograms.length), next: report.next.length, baseline: true, data: report.data.length,
   };
   return <nav aria-label="Parts of the page"><ul>{links.filter(([id]) => there[id]).map(([id, text]) => <li><button type="button" class="link" onClick={() => document.getElementById(id)?.scrollIntoView({ behavior: "smooth" })}>{text}</button></li>)}</ul></nav>;
 }
@@ -55,7 +56,7 @@ export function App() {
         {noName && <Unexplained />}
         <Where /><Explore /><Photographs /><Why />
         {!noName && <Unexplained />}
-        <Detail /><Histograms /><Next /><Baseline /><Data /><Methods /><Provenance />
+        <Power /><Detail /><Histograms /><Next /><Baseline /><Data /><Methods /><Provenance />
       </main>
     </>
   );

@@ -83,7 +83,7 @@ export function valueName(value: Value): string {
   return `${value.name}${entry}${value.object ? `, ${value.object}` : ""}`;
 }
 
-const unitSymbol = (unit: string) => (unit === "us" ? "\u00b5s" : unit === "deg" ? "\u00b0" : unit);
+export const unitSymbol = (unit: string) => (unit === "us" ? "\u00b5s" : unit === "deg" ? "\u00b0" : unit);
 
 // Times in the unit for people; others as they are.
 function scaled(value: Value): { factor: number; symbol: string } {

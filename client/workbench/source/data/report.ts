@@ -104,6 +104,12 @@ export interface Next {
   photograph?: { eye_m: XYZ; at_m: XYZ; up: XYZ };
 }
 
+// One value of an effect that the model lacks; sizes in `unit`.
+export interface Detectable {
+  effect: string; parameter: string; unit: string; finger: string; stage: string; std_error: number; typical: number;
+  power_at_typical: number; found_from?: number; rival: string; correlation: number; told_from?: number; parted_by: string;
+}
+
 export interface Report {
   verdict: string; summary: string; warnings: string[]; model_name: string; model_hash: string;
   data_problems: {
@@ -115,7 +121,7 @@ export interface Report {
     set_sha256: string; seed: string; command: string; date: string; client_version: string;
     meshes: { object: string; mesh_hash: string; path: string; file_sha256: string }[];
   };
-  p_nothing_missing?: number; hypotheses_tried: number;
+  p_nothing_missing?: number; hypotheses_tried: number; detectable: Detectable[];
 }
 
 export interface Rung {

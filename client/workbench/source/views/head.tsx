@@ -15,7 +15,7 @@ export function Head() {
   const { report, words } = page.value!;
   const main = report.data[words.main ?? 0];
   const word = report.verdict === "VERDICT_UNSPECIFIED" ? "" : report.verdict;
-  const wordOf = word ? word.toLowerCase().replace(/_/g, " ") : "comparison";
+  const wordOf = word ? word.toLowerCase().replace(/_/g, " ") : report.detectable.length ? "plan" : "comparison";
   const about = words.main !== undefined ? words.of_data[words.main] : undefined;
   const figures: [string, string, string][] = [];
   if (main && main.initial.rmse > 0) {

@@ -1,0 +1,73 @@
+"""check(), explain() and compare() of two models."""
+
+import numpy as np
+import pytest
+
+import touchstone
+
+NOMINAL = "touchstone: model/1\nname: nominal_rig\neffects:\n  - gaussian_noise: {sigma_us: 2000}\n"
+HIDDEN = NOMINAL.replace("nominal_rig", "fast_rig") + "  - speed_error: {relative: 0.08}\n"
+
+
+@pytest.fixture(scope="module")
+def client(server):
+    return touchstone.connect(server.target)
+
+
+@pytest.fixture(scope="module")
+def measured(client, tmp_path_factory):
+    """24 poses of lat20 in two rounds, by a rig that is too fast."""
+    touches = client.plan(touchstone.faces(samples_per_face=4, rounds=2), "lat20", count=48)
+    batch = client.touch("lat20", touches, model=HIDDEN, seed=1)
+    path = tmp_path_factory.mktemp("questions") / "set.csv"
+    touchstone.write_measurements(path, [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(batch["contact_time_us"][k]))
+                                         for k in range(len(touches))])
+    return path
+
+
+def test_a_check_says_from_which_size_each_effect_is_found(client, measured):
+    report = client.check(measured, NOMINAL)
+    assert report.verdict == "" and report.summary.startswith("Of ")
+    speed, = (value for value in report.detectable if value.effect == "speed_error")
+    assert speed.name == "relative" and speed.stage == "motion"
+    assert 0 < speed.std_error < speed.found_from < 0.08
+    assert (speed.rival, speed.told_from) == ("clock_skew", None) and speed.parted_by
+
+
+def test_twice_the_noise_takes_about_twice_the_size(client, measured):
+    sizes = [next(value.found_from for value in client.check(measured, NOMINAL, noise_us=noise).detectable
+                  if value.effect == "tip_radius") for noise in (1000, 2000)]
+    assert sizes[1] / sizes[0] == pytest.approx(2, rel=0.15)
+
+
+def test_improving_proposes_touches(client, measured):
+    report = client.check(measured, NOMINAL, improve=5, between=("finger_length", "channel_latency"))
+    assert len(report.next_touches) == 5
+    with pytest.raises(touchstone.InvalidRequest, match="depends on the question"):
+        client.check(measured, NOMINAL, improve=5)
+    with pytest.raises(touchstone.InvalidRequest, match="noise_us is 0"):
+        client.check(measured, NOMINAL, noise_us=0)
+
+
+def test_the_hidden_effect_explains_itself(client, measured):
+    explained = client.explain("speed_error", measured, NOMINAL).explained
+    value, = explained.values
+    assert value.interval[0] < 0.08 < value.interval[1]
+    assert explained.probability > 0.3 and explained.taken_over["clock_skew"] > 0.99
+    assert explained.message.speak_for[0].fall > 0
+    assert client.compare(measured, NOMINAL).explained is None
+
+
+def test_of_two_models_the_truth_errs_less(client, measured):
+    versus = client.compare(measured, NOMINAL, other_model=HIDDEN).versus
+    assert versus.rmse_difference < 0 and versus.interval[1] < 0 and versus.other_better == 1
+    assert versus.other.rmse == pytest.approx(client.compare(measured, HIDDEN).rmse_us)
+    assert "'fast_rig' errs less" in versus.words
+    assert client.compare(measured, NOMINAL).versus is None
+
+
+def test_a_report_of_a_set_says_what_it_could_not_have_shown(client, measured):
+    report = client.diagnose(measured, NOMINAL)
+    assert "speed_error" not in {value.effect for value in report.detectable}  # found
+    assert any(value.power_at_typical < 0.8 for value in report.detectable)
+    assert np.isfinite([value.std_error for value in report.detectable]).all()
