@@ -22,16 +22,19 @@ absl::Status CheckQuestion(const CheckOptions& options) {
     return absl::InvalidArgumentError("--improve: -o FILE was expected, where the touches are written");
   if (options.improve > 0 && (!asked || (!options.find.empty() && !options.between.empty())))
     return absl::InvalidArgumentError(
-        "--improve: which touches help depends on the question; one of --find EFFECT and --between EFFECT,EFFECT was "
+        "--improve: which touches help depends on the question; one of --find EFFECT and --between "
+        "EFFECT,EFFECT was "
         "expected");
   if (options.improve == 0 && (asked || !options.output.empty()))
-    return absl::InvalidArgumentError("--find, --between and -o belong to --improve N, the touches to propose");
+    return absl::InvalidArgumentError(
+        "--find, --between and -o belong to --improve N, the touches to propose");
   return absl::OkStatus();
 }
 
 absl::Status RunCheck(const Cli& cli, const CheckOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckQuestion(options));
-  TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}, {"-o", options.output}}));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CheckRequest request;
   request.set_noise_us(options.noise_us);
@@ -67,13 +70,15 @@ void AddCheck(Cli* cli) {
   options->set_text = kPlanText;
   CLI::App* command = cli->AddCommand(
       nullptr, "check",
-      "Says what a plan of touches can find before any is made: from which size each effect is found, what it is "
+      "Says what a plan of touches can find before any is made: from which size each effect is found, what "
+      "it is "
       "told from, and what is missed.",
       "touchstone plan lat20 -o plan.csv\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000 --html plan.html\n"
       "touchstone check plan.csv --model nominal.yaml --noise 5000 --json - | jq '.detectable[0]'\n"
-      "touchstone check plan.csv --model nominal.yaml --noise 5000 --improve 24 --between tip_radius,oblique_slip \\\n"
+      "touchstone check plan.csv --model nominal.yaml --noise 5000 --improve 24 --between "
+      "tip_radius,oblique_slip \\\n"
       "  -o more.csv",
       [cli, options] { return RunCheck(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
@@ -82,13 +87,16 @@ void AddCheck(Cli* cli) {
                    "Standard deviation of one finger's time, us. Default: that of the model's noise")
       ->type_name("US")
       ->check(CLI::PositiveNumber);
-  command->add_option("--improve", options->improve, "Propose N further touches that help with a question; with -o")
+  command
+      ->add_option("--improve", options->improve,
+                   "Propose N further touches that help with a question; with -o")
       ->type_name("N");
   command->add_option("--find", options->find, "The question: find this effect at smaller sizes")
       ->type_name("EFFECT");
   command->add_option("--between", options->between, "The question: tell two effects apart")
       ->type_name("EFFECT,EFFECT");
-  cli->AddOutput(command, "-o,--output", &options->output, "The plan (CSV) of the touches that --improve proposes");
+  cli->AddOutput(command, "-o,--output", &options->output,
+                 "The plan (CSV) of the touches that --improve proposes");
 }
 
 }  // namespace touchstone::cli

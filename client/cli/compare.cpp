@@ -26,9 +26,11 @@ void AddCompare(Cli* cli) {
   options->most_models = 2;
   CLI::App* command = cli->AddCommand(
       nullptr, "compare",
-      "Says how wrong a model is against measured touches or photographs, and where; of two models, which errs less.",
+      "Says how wrong a model is against measured touches or photographs, and where; of two models, which "
+      "errs less.",
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes\n"
-      "touchstone compare set.csv --model nominal.yaml --model better.yaml --mesh-dir meshes   which errs less\n"
+      "touchstone compare set.csv --model nominal.yaml --model better.yaml --mesh-dir meshes   which errs "
+      "less\n"
       "touchstone compare set.csv --model better.yaml --mesh cup=cup.off --html report.html\n"
       "touchstone compare set.csv --model nominal.yaml --mesh-dir meshes --json - | jq '.data[0].initial'\n"
       "touchstone compare photos --model nominal.yaml --mesh-dir meshes --html report.html",

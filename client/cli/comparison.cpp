@@ -214,20 +214,21 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
     cli->AddInput(command, option);
     return option;
   };
-  add_input(
-      options->set_name, options->set, "",
-      !options->set_text.empty() ? options->set_text :
-      "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG files; with a "
-      "touches.csv in it `compare` and `diagnose` take both), or the journal (.db) of a rig's session; -: "
-      "stdin; with "
-      "--server "
-      "also a stored session's name")
+  add_input(options->set_name, options->set, "",
+            !options->set_text.empty() ? options->set_text
+                                       : "The measurement file (CSV), the folder of photographs (images.csv, "
+                                         "camera.yaml and PNG files; with a "
+                                         "touches.csv in it `compare` and `diagnose` take both), or the "
+                                         "journal (.db) of a rig's session; -: "
+                                         "stdin; with "
+                                         "--server "
+                                         "also a stored session's name")
       ->required(options->set_required);
-  CLI::Option* model =
-      add_input("--model", options->models, "MODEL",
-                options->most_models > 1
-                    ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
-                    : "Model file, name or hash. Default: the source's own");
+  CLI::Option* model = add_input(
+      "--model", options->models, "MODEL",
+      options->most_models > 1
+          ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
+          : "Model file, name or hash. Default: the source's own");
   model->take_all()->expected(1);
   add_input("--also", options->also, "FILE",
             "A file of your own effects (formulas) that compete with the catalogue, repeatable")
@@ -273,8 +274,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   v1::Evidence& evidence = comparison->evidence_;
   evidence.set_seed(options.seed);
   // Files are checked here, so that errors name them.
-  TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(),
-                              ReadModel(options.model()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_model(), ReadModel(options.model()));
   if (options.models.size() > 1) {
     TOUCHSTONE_ASSIGN_OR_RETURN(comparison->other_model_, ReadModel(options.models[1]));
   }

@@ -18,7 +18,8 @@ namespace touchstone::cli {
 
 // Of commands whose set is a plan.
 inline constexpr char kPlanText[] =
-    "The plan (CSV of touches with poses, as `touchstone plan` writes it), or a measurement file, whose times are not read; "
+    "The plan (CSV of touches with poses, as `touchstone plan` writes it), or a measurement file, whose "
+    "times are not read; "
     "-: stdin";
 
 struct ComparisonOptions {

@@ -32,7 +32,8 @@ void AddExplain(Cli* cli) {
   auto options = std::make_shared<ExplainOptions>();
   CLI::App* command = cli->AddCommand(
       nullptr, "explain",
-      "Says why one effect is, or is not, what a model lacks: its best value, what it leaves, which touches speak for "
+      "Says why one effect is, or is not, what a model lacks: its best value, what it leaves, which touches "
+      "speak for "
       "and against it, and what others take over.",
       "touchstone explain oblique_slip set.csv --model nominal.yaml --mesh-dir meshes\n"
       "touchstone explain tip_radius set.csv --model nominal.yaml --mesh-dir meshes --json - | jq .explained",

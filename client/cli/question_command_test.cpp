@@ -28,7 +28,8 @@ class QuestionCommandTest : public RealBinaryTest {
   void MakePlan() {
     Write("nominal.yaml", kModelFile);
     Write("tips.yaml", std::string(kModelFile) + "  - tip_radius: {radius_mm: 3}\n");
-    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2", "-o", "plan.csv"})
+    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2", "-o",
+                   "plan.csv"})
                   .exit_code,
               0);
   }
@@ -42,8 +43,9 @@ TEST_F(QuestionCommandTest, ACheckListsEveryEffectWithItsSize) {
   MakePlan();
   const Outcome outcome = Run({"check", "plan.csv", "--model", "nominal.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("48 touches on one object, noise 5.00 ms"), HasSubstr("tip_radius"),
-                                 HasSubstr("never: acts as clock_skew"), HasSubstr("found from")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("48 touches on one object, noise 5.00 ms"), HasSubstr("tip_radius"),
+                    HasSubstr("never: acts as clock_skew"), HasSubstr("found from")));
 }
 
 TEST_F(QuestionCommandTest, ACheckIsTheSameWhateverTheTimesOfTheSet) {
@@ -76,7 +78,8 @@ TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
   EXPECT_THAT(message({"--improve", "6", "--find", "tip_radius"}), HasSubstr("-o FILE was expected"));
   EXPECT_THAT(message({"--improve", "6", "-o", "more.csv"}), HasSubstr("depends on the question"));
   EXPECT_THAT(message({"--find", "tip_radius"}), HasSubstr("belong to --improve"));
-  EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}), HasSubstr("'tip_radios'"));
+  EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}),
+              HasSubstr("'tip_radios'"));
   EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise"));
   Write("silent.yaml", "touchstone: model/1\nname: silent\nend_effector: {fingers: 3, spacing_mm: 30}\n");
   const Outcome silent = Run({"check", "plan.csv", "--model", "silent.yaml"});
@@ -85,7 +88,8 @@ TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
 
 TEST_F(QuestionCommandTest, APlanWithoutTimesIsRefusedWhereTimesAreRead) {
   MakePlan();
-  EXPECT_THAT(Run({"explain", "tip_radius", "plan.csv", "--model", "nominal.yaml"}).err, HasSubstr("it is a plan"));
+  EXPECT_THAT(Run({"explain", "tip_radius", "plan.csv", "--model", "nominal.yaml"}).err,
+              HasSubstr("it is a plan"));
   EXPECT_THAT(Run({"compare", "plan.csv", "--model", "nominal.yaml"}).err, HasSubstr("it is a plan"));
 }
 
@@ -107,6 +111,32 @@ TEST_F(QuestionCommandTest, OfTwoModelsTheTruthErrsLess) {
   EXPECT_THAT(Run({"compare", "set.csv", "--model", "nominal.yaml"}).out, Not(HasSubstr("Two models")));
   EXPECT_THAT(Run({"diagnose", "set.csv", "--model", "nominal.yaml", "--model", "tips.yaml"}).err,
               HasSubstr("--model: given 2 times; once was expected"));
+}
+
+TEST_F(QuestionCommandTest, ARehearsalGoesOnWhereItWasStoppedAndEndsAlike) {
+  MakePlan();
+  const auto rehearse = [&](const char* sets, const char* state) {
+    return Run({"rehearse", "plan.csv", "--model", "nominal.yaml", "--effects", "tip_radius", "--pairs", "0",
+                "--sets", sets, "--state", state, "--json", "-"});
+  };
+  ASSERT_EQ(rehearse("2", "cut.jsonl").exit_code, 0);
+  // What a kill leaves: a line that ends in the middle.
+  Write("cut.jsonl", Read("cut.jsonl") + "{\"case\": \"outs");
+  const Outcome resumed = rehearse("4", "cut.jsonl"), whole = rehearse("4", "whole.jsonl");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(resumed.out, whole.out);
+  EXPECT_EQ(Read("cut.jsonl"), Read("whole.jsonl"));
+  const Json rows = Json::parse(whole.out);
+  EXPECT_EQ(rows[0]["hidden"], "nothing");
+  EXPECT_EQ(rows[1]["found"], 1);  // a tip of the usual size
+  EXPECT_EQ(rows.back()["sets"], 4);
+  Write("tips.csv", Read("plan.csv") + "48,lat20,20,60,0,0,0,0,0,-1,1,0,0,0\n");
+  EXPECT_THAT(Run({"rehearse", "tips.csv", "--model", "nominal.yaml", "--effects", "tip_radius", "--pairs",
+                   "0", "--sets", "4", "--state", "cut.jsonl"})
+                  .err,
+              HasSubstr("is of another plan"));
+  EXPECT_THAT(Run({"rehearse", "plan.csv", "--model", "nominal.yaml", "--size", "much"}).err,
+              HasSubstr("'found' was expected"));
 }
 
 }  // namespace

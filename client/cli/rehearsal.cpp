@@ -40,14 +40,16 @@ std::string FirstValue(const model::Effect& effect, int fingers, double size) {
 absl::StatusOr<model::Model> Hiding(const model::Model& given, const v1::DetectableEffect& value,
                                     const HiddenSize& size) {
   const auto effect = effects::Catalogue().Find(value.effect());
-  const double of_file = size.found ? value.found_from()
+  const double of_file = size.found                         ? value.found_from()
                          : effect->parameters[0].reciprocal ? value.typical() / size.times_typical
                                                             : value.typical() * size.times_typical;
-  return model::AddEffect(given, value.effect(), {FirstValue(*effect, given.fingers, of_file)}, effects::Catalogue());
+  return model::AddEffect(given, value.effect(), {FirstValue(*effect, given.fingers, of_file)},
+                          effects::Catalogue());
 }
 
 bool Names(const v1::Step& step, const std::string& effect) {
-  return step.effect() == effect || std::count(step.equivalent().begin(), step.equivalent().end(), effect) > 0;
+  return step.effect() == effect ||
+         std::count(step.equivalent().begin(), step.equivalent().end(), effect) > 0;
 }
 
 // The hidden value of a parameter's entry, in the unit of files; NaN: it is not hidden.
@@ -59,7 +61,8 @@ double TruthOf(const RehearsedCase& hidden, const std::string& effect, const v1:
       const int count = parameter.Count(hidden.model.fingers);
       if (parameter.name == value.name()) {
         int entry = 0;
-        const std::string fingers = hidden.model.fingers == 3 && parameter.arity == model::Arity::kPerFinger ? "lmr" : "xyz";
+        const std::string fingers =
+            hidden.model.fingers == 3 && parameter.arity == model::Arity::kPerFinger ? "lmr" : "xyz";
         if (!value.finger().empty()) {
           const size_t at = fingers.find(value.finger());
           entry = at == std::string::npos ? std::atoi(value.finger().c_str()) : static_cast<int>(at);
@@ -75,21 +78,23 @@ double TruthOf(const RehearsedCase& hidden, const std::string& effect, const v1:
 }  // namespace
 
 absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, const v1::Report& check,
-                                                     const HiddenSize& size, const std::vector<std::string>& only,
-                                                     int pairs, uint64_t seed) {
+                                                     const HiddenSize& size,
+                                                     const std::vector<std::string>& only, int pairs,
+                                                     uint64_t seed) {
   std::vector<std::string> names;
   for (const v1::DetectableEffect& value : check.detectable())
     if (names.empty() || names.back() != value.effect()) names.push_back(value.effect());
   for (const std::string& name : only)
     if (std::find(names.begin(), names.end(), name) == names.end())
-      return absl::InvalidArgumentError(absl::StrCat("--effects: '", name,
-                                                     "' is no effect that this model lacks and touches can show; ",
-                                                     absl::StrJoin(names, ", "), " are"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("--effects: '", name, "' is no effect that this model lacks and touches can show; ",
+                       absl::StrJoin(names, ", "), " are"));
   if (!only.empty()) names = only;
   if (size.found)  // what is never found has no such size
-    names.erase(std::remove_if(names.begin(), names.end(),
-                               [&](const std::string& name) { return !FirstOf(check, name)->has_found_from(); }),
-                names.end());
+    names.erase(
+        std::remove_if(names.begin(), names.end(),
+                       [&](const std::string& name) { return !FirstOf(check, name)->has_found_from(); }),
+        names.end());
   std::vector<RehearsedCase> cases = {{"nothing", {}, given}};
   for (const std::string& name : names) {
     const v1::DetectableEffect& value = *FirstOf(check, name);
@@ -104,13 +109,14 @@ absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, 
     const size_t other = (one + 1 + random.Below(names.size() - 1)) % names.size();
     TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model, Hiding(given, *FirstOf(check, names[one]), size));
     TOUCHSTONE_ASSIGN_OR_RETURN(model, Hiding(model, *FirstOf(check, names[other]), size));
-    cases.push_back({absl::StrCat(names[one], "+", names[other]), {names[one], names[other]}, std::move(model)});
+    cases.push_back(
+        {absl::StrCat(names[one], "+", names[other]), {names[one], names[other]}, std::move(model)});
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(
       model::Model outside,
       model::AddEffect(given, "formula",
-                       {"name=rehearsed", "adds=travel_mm", absl::StrCat("expression=", kOutsideTerm), kOutsideMm,
-                        "k_unit=mm"},
+                       {"name=rehearsed", "adds=travel_mm", absl::StrCat("expression=", kOutsideTerm),
+                        kOutsideMm, "k_unit=mm", "k_min=-5", "k_max=5"},
                        effects::Catalogue()));
   cases.push_back({"outside", {}, std::move(outside), true});
   cases.push_back({"mistake", {}, given, false, true});
@@ -132,10 +138,12 @@ RehearsedSet Judge(const RehearsedCase& hidden, const v1::Report& report) {
     const bool made_up = !is_hidden && !effects::Catalogue().Find(step.effect())->random();
     set.false_claim |= made_up;
     set.confident |= made_up && step.probability() >= kConfident;
-    if (std::find(hidden.effects.begin(), hidden.effects.end(), step.effect()) == hidden.effects.end()) continue;
+    if (std::find(hidden.effects.begin(), hidden.effects.end(), step.effect()) == hidden.effects.end())
+      continue;
     for (const v1::ParameterValue& value : step.parameters()) {
       const double truth = TruthOf(hidden, step.effect(), value);
-      if (std::isfinite(truth) && value.std_error() > 0) set.z.push_back((value.value() - truth) / value.std_error());
+      if (std::isfinite(truth) && value.std_error() > 0)
+        set.z.push_back((value.value() - truth) / value.std_error());
     }
   }
   const bool checks = report.verdict() == v1::Report::CHECK_DATA;
@@ -150,8 +158,9 @@ RehearsedSet Judge(const RehearsedCase& hidden, const v1::Report& report) {
 }
 
 Json ToJson(const RehearsedSet& set) {
-  return {{"case", set.name},           {"found", set.found},         {"right", set.right},
-          {"false_claim", set.false_claim}, {"confident", set.confident}, {"z", set.z}};
+  return {{"case", set.name},           {"found", set.found},
+          {"right", set.right},         {"false_claim", set.false_claim},
+          {"confident", set.confident}, {"z", set.z}};
 }
 
 absl::StatusOr<RehearsedSet> SetFromJson(const Json& json) {
@@ -175,11 +184,13 @@ Interval95 IntervalOf(int count, int of) {
           count == of ? 1 : BetaQuantile(0.975, count + 1, of - count)};
 }
 
-std::vector<RehearsalRow> Summarise(const std::vector<RehearsedCase>& cases, const std::vector<RehearsedSet>& sets) {
+std::vector<RehearsalRow> Summarise(const std::vector<RehearsedCase>& cases,
+                                    const std::vector<RehearsedSet>& sets) {
   std::vector<RehearsalRow> rows;
   const auto add = [](const RehearsedSet& set, RehearsalRow* row) {
     ++row->sets;
-    row->found += set.found, row->right += set.right, row->honest += set.honest(), row->confident += set.confident;
+    row->found += set.found, row->right += set.right, row->honest += set.honest(),
+        row->confident += set.confident;
     for (const double z : set.z) {
       ++row->values;
       row->covered += std::abs(z) <= kNormalQuantile975;

@@ -34,8 +34,8 @@ absl::StatusOr<HiddenSize> ParseSize(const std::string& text) {
   char* end = nullptr;
   size.times_typical = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0' || !(size.times_typical > 0) || !std::isfinite(size.times_typical))
-    return absl::InvalidArgumentError(
-        absl::StrCat("--size: '", text, "'; a positive number (times what rigs usually show) or 'found' was expected"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--size: '", text, "'; a positive number (times what rigs usually show) or 'found' was expected"));
   return size;
 }
 
@@ -53,14 +53,16 @@ class RehearsalState {
       const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
       if (number == 1) {
         if (json != of)
-          return absl::FailedPreconditionError(absl::StrCat(
-              "--state: ", path, " is of another plan, model, seed or size; another file, or none, was expected"));
+          return absl::FailedPreconditionError(
+              absl::StrCat("--state: ", path,
+                           " is of another plan, model, seed or size; another file, or none, was expected"));
         continue;
       }
       if (json.is_discarded() && file.peek() == EOF) break;  // cut by what stopped it: made again
       absl::StatusOr<RehearsedSet> set = SetFromJson(json);
       if (!set.ok())
-        return absl::Status(set.status().code(), absl::StrCat(path, ":", number, ": ", set.status().message()));
+        return absl::Status(set.status().code(),
+                            absl::StrCat(path, ":", number, ": ", set.status().message()));
       state.sets_.push_back(*std::move(set));
     }
     TOUCHSTONE_RETURN_IF_ERROR(state.WriteAll(of));
@@ -73,7 +75,8 @@ class RehearsalState {
     std::ofstream file(path_, std::ios::app);
     file << ToJson(sets_.back()).dump() << '\n';
     file.flush();
-    return file ? absl::OkStatus() : absl::DataLossError(absl::StrCat("--state: ", path_, " cannot be written"));
+    return file ? absl::OkStatus()
+                : absl::DataLossError(absl::StrCat("--state: ", path_, " cannot be written"));
   }
   const std::vector<RehearsedSet>& sets() const { return sets_; }
 
@@ -82,7 +85,8 @@ class RehearsalState {
     std::ofstream file(path_, std::ios::trunc);
     file << of.dump() << '\n';
     for (const RehearsedSet& set : sets_) file << ToJson(set).dump() << '\n';
-    return file ? absl::OkStatus() : absl::InvalidArgumentError(absl::StrCat("--state: ", path_, " cannot be written"));
+    return file ? absl::OkStatus()
+                : absl::InvalidArgumentError(absl::StrCat("--state: ", path_, " cannot be written"));
   }
 
   std::string path_;
@@ -90,8 +94,9 @@ class RehearsalState {
 };
 
 // The plan's touches under a model, as a measurement file.
-absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& plan, const RehearsedCase& hidden,
-                                      uint64_t seed, client::Connection* connection) {
+absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& plan,
+                                      const RehearsedCase& hidden, uint64_t seed,
+                                      client::Connection* connection) {
   std::vector<client::MeasuredTouch> measured = plan;
   constexpr size_t kPerRequest = 1000;
   for (size_t first = 0, stop = 0; first < measured.size(); first = stop) {
@@ -109,7 +114,8 @@ absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& 
     for (size_t k = first; k < stop; ++k) {
       const auto& time_s = response.results(static_cast<int>(k - first)).contact_time_s();
       measured[k].time_s.assign(time_s.begin(), time_s.end());
-      if (hidden.is_mistake && measured[k].time_s.size() > 1) std::swap(measured[k].time_s[0], measured[k].time_s[1]);
+      if (hidden.is_mistake && measured[k].time_s.size() > 1)
+        std::swap(measured[k].time_s[0], measured[k].time_s[1]);
     }
   }
   return client::FormatMeasurements(measured);
@@ -118,11 +124,13 @@ absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& 
 std::string SharePercent(int count, int of) {
   if (of == 0) return "-";
   const Interval95 interval = IntervalOf(count, of);
-  return absl::StrFormat("%.0f %% (%.0f-%.0f)", 100.0 * count / of, 100 * interval.lower, 100 * interval.upper);
+  return absl::StrFormat("%.0f %% (%.0f-%.0f)", 100.0 * count / of, 100 * interval.lower,
+                         100 * interval.upper);
 }
 
 std::string SummaryText(const std::vector<RehearsalRow>& rows) {
-  Table table({"HIDDEN", "SETS", "FOUND", "CHECK SAYS", "RIGHT", "CONFIDENTLY WRONG", "COVERAGE", "BIAS", "SPREAD"});
+  Table table(
+      {"HIDDEN", "SETS", "FOUND", "CHECK SAYS", "RIGHT", "CONFIDENTLY WRONG", "COVERAGE", "BIAS", "SPREAD"});
   for (const RehearsalRow& row : rows) {
     if (row.sets == 0) continue;
     table.Add({row.name, absl::StrCat(row.sets), SharePercent(row.found, row.sets),
@@ -132,11 +140,12 @@ std::string SummaryText(const std::vector<RehearsalRow>& rows) {
                row.values == 0 ? "" : absl::StrFormat("%+.2f", row.mean_z),
                row.values < 2 ? "" : absl::StrFormat("%.2f", row.spread_z)});
   }
-  return absl::StrCat(
-      table.Text(),
-      "\nIn brackets: 95 % intervals. Coverage: hidden values within the 95 % interval that was reported. Bias and spread: of\n"
-      "(value - truth) / standard error; 0 and 1 are right. The simulation that hides is the one that diagnoses: what it\n"
-      "lacks altogether, this does not show.\n");
+  return absl::StrCat(table.Text(),
+                      "\nIn brackets: 95 % intervals. Coverage: hidden values within the 95 % interval that "
+                      "was reported. Bias and spread: of\n"
+                      "(value - truth) / standard error; 0 and 1 are right. The simulation that hides is the "
+                      "one that diagnoses: what it\n"
+                      "lacks altogether, this does not show.\n");
 }
 
 Json SummaryJson(const std::vector<RehearsalRow>& rows) {
@@ -169,8 +178,8 @@ class Rehearsal {
 
   absl::Status Prepare() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const HiddenSize size, ParseSize(options_.size));
-    TOUCHSTONE_ASSIGN_OR_RETURN(plan_,
-                                client::ParseMeasurements(comparison_->evidence().csv(), comparison_->evidence().origin()));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        plan_, client::ParseMeasurements(comparison_->evidence().csv(), comparison_->evidence().origin()));
     if (plan_.empty()) return absl::InvalidArgumentError("PLAN: has no touch");
     v1::CheckRequest request;
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report check,
@@ -190,12 +199,9 @@ class Rehearsal {
         cases_, ListCases(model, check, size, only, static_cast<int>(options_.pairs), options_.seed));
     std::vector<std::string> names;
     for (const RehearsedCase& one : cases_) names.push_back(one.name);
-    const Json of = {{"rehearsal", 1},
-                     {"plan", Sha256Hex(comparison_->evidence().csv())},
-                     {"model", given.hash()},
-                     {"size", options_.size},
-                     {"seed", options_.seed},
-                     {"cases", names}};
+    const Json of = {{"rehearsal", 1},        {"plan", Sha256Hex(comparison_->evidence().csv())},
+                     {"model", given.hash()}, {"size", options_.size},
+                     {"seed", options_.seed}, {"cases", names}};
     TOUCHSTONE_ASSIGN_OR_RETURN(state_, RehearsalState::Open(options_.state, of));
     return absl::OkStatus();
   }
@@ -208,10 +214,12 @@ class Rehearsal {
     };
     const size_t wanted = options_.sets > 0 ? options_.sets : SIZE_MAX;
     ProgressBar bar(!cli_.output().quiet);
-    for (size_t n = state_.sets().size(); n < wanted && (options_.sets > 0 || minutes() < options_.minutes); ++n) {
+    for (size_t n = state_.sets().size(); n < wanted && (options_.sets > 0 || minutes() < options_.minutes);
+         ++n) {
       const RehearsedCase& hidden = cases_[n % cases_.size()];
-      bar.ShowStage(absl::StrCat("set ", n + 1, ": ", hidden.name),
-                    options_.sets > 0 ? static_cast<double>(n) / options_.sets : minutes() / options_.minutes);
+      bar.ShowStage(
+          absl::StrCat("set ", n + 1, ": ", hidden.name),
+          options_.sets > 0 ? static_cast<double>(n) / options_.sets : minutes() / options_.minutes);
       v1::DiagnoseRequest request;
       *request.mutable_evidence() = comparison_->evidence();
       request.mutable_evidence()->set_seed(options_.seed + n);
@@ -241,7 +249,8 @@ class Rehearsal {
 
 absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
   if (!(options.minutes > 0))
-    return absl::InvalidArgumentError(absl::StrCat("--minutes: ", options.minutes, "; a positive number was expected"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--minutes: ", options.minutes, "; a positive number was expected"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   if (comparison->evidence().csv().empty())
     return absl::InvalidArgumentError("PLAN: a measurement file or plan (CSV) of touches was expected");
@@ -251,7 +260,8 @@ absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
   // What was done before an interruption is said all the same.
   if (!run.ok() && !absl::IsCancelled(run)) return run;
   const std::vector<RehearsalRow> rows = rehearsal.Rows();
-  if (!options.json.empty()) TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.json, SummaryJson(rows).dump(2) + "\n"));
+  if (!options.json.empty())
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.json, SummaryJson(rows).dump(2) + "\n"));
   if (!options.ReportOnStdout()) TOUCHSTONE_RETURN_IF_ERROR(cli.Print(SummaryText(rows)));
   return run;
 }
@@ -264,26 +274,36 @@ void AddRehearse(Cli* cli) {
   options->set_text = kPlanText;
   CLI::App* command = cli->AddCommand(
       nullptr, "rehearse",
-      "Hides effects, pairs, a cause of no catalogue, a mistake and nothing in simulated sets of your own plan, diagnoses "
+      "Hides effects, pairs, a cause of no catalogue, a mistake and nothing in simulated sets of your own "
+      "plan, diagnoses "
       "each, and says how often the answer is right.",
       "touchstone rehearse plan.csv --model rig.yaml --minutes 5\n"
-      "touchstone rehearse plan.csv --model rig.yaml --sets 200 --state rehearsal.jsonl      goes on where it was stopped\n"
+      "touchstone rehearse plan.csv --model rig.yaml --sets 200 --state rehearsal.jsonl      goes on where "
+      "it was stopped\n"
       "touchstone rehearse plan.csv --model rig.yaml --effects tip_radius,oblique_slip --size 0.1\n"
-      "touchstone rehearse plan.csv --model rig.yaml --size found      at the sizes that `touchstone check` gives",
+      "touchstone rehearse plan.csv --model rig.yaml --size found      at the sizes that `touchstone check` "
+      "gives",
       [cli, options] { return RunRehearse(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
   command->add_option("--minutes", options->minutes, "Ends after so long. Default: 10")->type_name("N");
-  command->add_option("--sets", options->sets, "Ends after so many sets, whatever the time. Default: by --minutes")
+  command
+      ->add_option("--sets", options->sets,
+                   "Ends after so many sets, whatever the time. Default: by --minutes")
       ->type_name("N");
   command
-      ->add_option("--size", options->size,
-                   "Of a hidden effect, times what rigs usually show; found: where a check says 80 %. Default: 1")
+      ->add_option(
+          "--size", options->size,
+          "Of a hidden effect, times what rigs usually show; found: where a check says 80 %. Default: 1")
       ->type_name("N");
-  command->add_option("--effects", options->effects, "Hide these only (and nothing, outside, mistake). Default: all")
+  command
+      ->add_option("--effects", options->effects,
+                   "Hide these only (and nothing, outside, mistake). Default: all")
       ->type_name("A,B");
-  command->add_option("--pairs", options->pairs, "Pairs of effects among what is hidden. Default: 2")->type_name("N");
-  command->add_option("--state", options->state,
-                      "A file of the sets that are done: the same command goes on where it was stopped")
+  command->add_option("--pairs", options->pairs, "Pairs of effects among what is hidden. Default: 2")
+      ->type_name("N");
+  command
+      ->add_option("--state", options->state,
+                   "A file of the sets that are done: the same command goes on where it was stopped")
       ->type_name("FILE");
 }
 

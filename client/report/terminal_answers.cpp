@@ -16,7 +16,8 @@ using TextCell = TextLayout::Cell;
 
 constexpr double kNothing = 1e-3;  // nats
 
-void AddDeciding(const std::string& label, const google::protobuf::RepeatedPtrField<v1::DecidingMeasurement>& touches,
+void AddDeciding(const std::string& label,
+                 const google::protobuf::RepeatedPtrField<v1::DecidingMeasurement>& touches,
                  const ErrorScale& scale, TextLayout* out) {
   if (touches.empty()) return;
   out->Label(label);
@@ -64,8 +65,9 @@ std::string TerminalExplanation(const v1::Report& report, int width, bool colour
   const v1::ExplainedEffect& explained = report.explained();
   if (report.data_size() > 0) {
     const v1::DataReport& data = report.data(0);
-    out.Lead(absl::StrCat(data.session().empty() ? "" : absl::StrCat(data.session(), ": "), Count(data.count()),
-                          " touches, model '", report.model_name(), "'.", NoiseFloorSentence(data)));
+    out.Lead(absl::StrCat(data.session().empty() ? "" : absl::StrCat(data.session(), ": "),
+                          Count(data.count()), " touches, model '", report.model_name(), "'.",
+                          NoiseFloorSentence(data)));
   }
   for (const std::string& warning : report.warnings())
     out.Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
@@ -79,7 +81,8 @@ std::string TerminalExplanation(const v1::Report& report, int width, bool colour
   out.Label("Values");
   std::vector<std::vector<TextCell>> rows;
   for (const v1::ParameterValue& value : explained.parameters())
-    rows.push_back({{ParameterName(value)}, {ValueWithError(value)}, {absl::StrCat("95 %: ", Interval(value))}});
+    rows.push_back(
+        {{ParameterName(value)}, {ValueWithError(value)}, {absl::StrCat("95 %: ", Interval(value))}});
   out.Rows(rows);
   out.Label("Error");
   out.Rows({{{"the model as it is"}, {scale.Text(data.initial().rmse()), true}},
@@ -88,8 +91,8 @@ std::string TerminalExplanation(const v1::Report& report, int width, bool colour
             {{"noise floor"}, {scale.Text(data.noise_floor()), true, TextLayout::kDim}}});
   out.Label("Probability");
   out.Paragraph(absl::StrCat(EffectProbability(explained.probability()),
-                             " that it is the one effect that is missing; gain ", Number(explained.gain_nats()),
-                             " nats."));
+                             " that it is the one effect that is missing; gain ",
+                             Number(explained.gain_nats()), " nats."));
   if (!explained.taken_over().empty()) {
     out.Label("Taken over");
     std::vector<std::vector<TextCell>> taken;

@@ -16,9 +16,9 @@ namespace {
 
 using TextCell = TextLayout::Cell;
 
-constexpr double kPower = 0.8;    // that found_from and told_from mean
+constexpr double kPower = 0.8;     // that found_from and told_from mean
 constexpr int kWideColumns = 100;  // from where what rigs show has a column
-constexpr double kTied = 0.9995;  // correlation
+constexpr double kTied = 0.9995;   // correlation
 
 std::string Size(double size, const v1::DetectableEffect& value) {
   return value.unit().empty() ? Number(size, 2) : absl::StrCat(Number(size, 2), " ", value.unit());
@@ -84,9 +84,9 @@ void AddParting(const v1::Report& report, TextLayout* out) {
   if (order.empty()) return;
   out->Label("To tell");
   for (const std::string& measurement : order)
-    out->Paragraph(absl::StrCat(Join({pairs[measurement].begin(), pairs[measurement].end()}, "and"), ": ",
-                                measurement),
-                   TextLayout::kPlain, 2);
+    out->Paragraph(
+        absl::StrCat(Join({pairs[measurement].begin(), pairs[measurement].end()}, "and"), ": ", measurement),
+        TextLayout::kPlain, 2);
 }
 
 }  // namespace
@@ -103,25 +103,24 @@ void AddBlindSpots(const v1::Report& report, TextLayout* out) {
   for (const std::string& effect : order) {
     const v1::DetectableEffect& value = *best[effect];
     if (value.power_at_typical() >= kPower) continue;
-    blind.push_back(value.has_found_from()
-                        ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
-                        : absl::StrCat(effect, " at any size"));
+    blind.push_back(value.has_found_from() ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
+                                           : absl::StrCat(effect, " at any size"));
   }
   if (blind.empty()) return;
   out->Label("Blind to");
-  out->Paragraph(absl::StrCat("This set could not have shown ", Join(blind, "or"),
-                              ": rigs usually show less."));
+  out->Paragraph(
+      absl::StrCat("This set could not have shown ", Join(blind, "or"), ": rigs usually show less."));
 }
 
 std::string TerminalCheck(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
   if (report.data_size() > 0) {
     const v1::DataReport& data = report.data(0);
-    out.Lead(absl::StrCat("Plan ", data.session().empty() ? "" : absl::StrCat(data.session(), ": "),
-                          Count(data.count()), " touches on ",
-                          data.set().objects_size() == 1 ? "one object"
-                                                         : absl::StrCat(data.set().objects_size(), " objects"),
-                          ", noise ", Time(data.noise_floor()), ", model '", report.model_name(), "'."));
+    out.Lead(absl::StrCat(
+        "Plan ", data.session().empty() ? "" : absl::StrCat(data.session(), ": "), Count(data.count()),
+        " touches on ",
+        data.set().objects_size() == 1 ? "one object" : absl::StrCat(data.set().objects_size(), " objects"),
+        ", noise ", Time(data.noise_floor()), ", model '", report.model_name(), "'."));
   }
   for (const std::string& warning : report.warnings())
     out.Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
@@ -132,10 +131,11 @@ std::string TerminalCheck(const v1::Report& report, int width, bool colour) {
   AddTable(report, &out);
   out.Blank();
   AddParting(report, &out);
-  out.Paragraph(absl::StrCat("Found from: the size that a diagnosis of such a set finds in ", Share(kPower),
-                             " of sets. Power: the share in which it finds the size that rigs usually show; none: the "
-                             "plan says nothing about the value, or it acts with other values only."),
-                TextLayout::kDim);
+  out.Paragraph(
+      absl::StrCat("Found from: the size that a diagnosis of such a set finds in ", Share(kPower),
+                   " of sets. Power: the share in which it finds the size that rigs usually show; none: the "
+                   "plan says nothing about the value, or it acts with other values only."),
+      TextLayout::kDim);
   AddUnusedRows(report, &out);
   return out.Take();
 }

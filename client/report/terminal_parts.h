@@ -11,7 +11,7 @@ void AddDataProblems(const v1::Report& report, TextLayout* out);   // mistakes o
 void AddWhy(const v1::Report& report, TextLayout* out);
 void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);
-void AddNext(const v1::Report& report, TextLayout* out);  // touches to make, pictures to take
+void AddNext(const v1::Report& report, TextLayout* out);        // touches to make, pictures to take
 void AddBlindSpots(const v1::Report& report, TextLayout* out);  // effects that the set could not have shown
 void AddVersus(const v1::Report& report, TextLayout* out);      // a comparison with a second model
 // Of photographs.

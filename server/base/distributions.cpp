@@ -20,8 +20,8 @@ double ChiSquaredQuantile(double p, double degrees_of_freedom) {
 double NoncentralChiSquaredTail(double x, double degrees_of_freedom, double noncentrality) {
   if (!(x > 0)) return 1;
   if (!(noncentrality > 0)) return ChiSquaredTail(x, degrees_of_freedom);
-  return boost::math::cdf(boost::math::complement(
-      boost::math::non_central_chi_squared(degrees_of_freedom, noncentrality), x));
+  return boost::math::cdf(
+      boost::math::complement(boost::math::non_central_chi_squared(degrees_of_freedom, noncentrality), x));
 }
 
 double NoncentralityForTail(double x, double degrees_of_freedom, double p) {

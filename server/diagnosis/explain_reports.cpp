@@ -59,14 +59,16 @@ std::string Words(const report::Explained& explained, double rmse_us) {
   if (!found.visible)
     return absl::StrCat("These touches do not depend on ", name, " at any size: they say nothing about it.");
   if (!found.changes)
-    return absl::StrCat(name, " is not what is missing: the touches fit best where it changes nothing", Excluded(found),
-                        ".");
+    return absl::StrCat(name, " is not what is missing: the touches fit best where it changes nothing",
+                        Excluded(found), ".");
   const std::string best = absl::StrCat("At its best (", ValuesInWords(found.parameters), ") ", name);
-  const std::string error = absl::StrCat("the RMSE goes from ", TimeInWords(kSecondsPerMicrosecond * rmse_us), " to ",
-                                         TimeInWords(kSecondsPerMicrosecond * explained.quality.rmse));
+  const std::string error =
+      absl::StrCat("the RMSE goes from ", TimeInWords(kSecondsPerMicrosecond * rmse_us), " to ",
+                   TimeInWords(kSecondsPerMicrosecond * explained.quality.rmse));
   if (found.gain_nats < found.needed_nats)
     return absl::StrFormat(
-        "%s changes the log evidence by %+.1f nats, and a search asks for %+.1f: these touches do not ask for it. Sizes "
+        "%s changes the log evidence by %+.1f nats, and a search asks for %+.1f: these touches do not ask "
+        "for it. Sizes "
         "outside of its 95 %% interval are excluded.",
         best, found.gain_nats, found.needed_nats);
   std::string words = absl::StrFormat("%s gains %.0f nats: %s.", best, found.gain_nats, error);
@@ -74,12 +76,13 @@ std::string Words(const report::Explained& explained, double rmse_us) {
   if (rival == nullptr) return words + " No other effect does a part of the same.";
   const std::string other = NameInWords(rival->effect);
   if (rival->gain_nats > found.gain_nats + kAsGood)
-    return absl::StrCat(words, absl::StrFormat(" %s alone gains %.0f nats, and does %.0f %% of what %s does: it explains "
-                                               "these touches better.",
-                                               other, rival->gain_nats, 100 * rival->share, name));
+    return absl::StrCat(
+        words, absl::StrFormat(" %s alone gains %.0f nats, and does %.0f %% of what %s does: it explains "
+                               "these touches better.",
+                               other, rival->gain_nats, 100 * rival->share, name));
   if (rival->gain_nats > found.gain_nats - kAsGood)
-    return absl::StrCat(words, " ", other, " explains them as well: ",
-                        engine::DiscriminatingMeasurement({name, rival->effect}));
+    return absl::StrCat(words, " ", other,
+                        " explains them as well: ", engine::DiscriminatingMeasurement({name, rival->effect}));
   return absl::StrCat(words, absl::StrFormat(" The best of what resembles it, %s, gains %.0f nats.", other,
                                              rival->gain_nats));
 }
@@ -95,7 +98,8 @@ absl::StatusOr<engine::EffectExplanation> Find(const std::string& effect, select
                                         engine::SearchRules(), [](const std::string&) {});
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const engine::Fit initial,
-        engine::FitModel(workspace->experiment, engine::Parameterization(model, workspace->searched->objects)));
+        engine::FitModel(workspace->experiment,
+                         engine::Parameterization(model, workspace->searched->objects)));
     TOUCHSTONE_ASSIGN_OR_RETURN(
         found, engine::ExplainEffect(search, initial, static_cast<int>(model.effects.size()), effect));
     if (!found.fit) break;
@@ -125,14 +129,17 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
   AddHowWrong(*workspace, before, &diagnosis);
   if (!diagnosis.data[0].initial)
-    return absl::InvalidArgumentError(absl::StrCat(input.set->origin, ": no touch can be compared with the model"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(input.set->origin, ": no touch can be compared with the model"));
   report::Explained& explained = diagnosis.explained.emplace();
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.found, Find(effect, workspace.get()));
   if (explained.found.fit) {
     const engine::Fit& fit = *explained.found.fit;
     const model::Model& with = fit.model.base();
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction, workspace->predictor->Run(with, true, false));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Quality quality, selection::QualityOfModel(*workspace, fit, with));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace->predictor->Run(with, true, false));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Quality quality,
+                                selection::QualityOfModel(*workspace, fit, with));
     explained.quality = report::InMicroseconds(quality);
     const std::vector<double> after = touches::Residuals(o, prediction);
     const double sigma_s = std::max(diagnosis.data[0].noise_floor->sigma * kSecondsPerMicrosecond, 1e-12);
@@ -149,29 +156,29 @@ absl::StatusOr<report::Versus> CompareWithOther(const selection::Workspace& work
   const model::Model& given = *workspace.input.other_model;
   if (given.fingers != workspace.input.model->fingers)
     return absl::InvalidArgumentError(absl::StrCat("the model '", given.name, "' has ", given.fingers,
-                                                   " fingers, the model '", workspace.input.model->name, "' has ",
-                                                   workspace.input.model->fingers));
+                                                   " fingers, the model '", workspace.input.model->name,
+                                                   "' has ", workspace.input.model->fingers));
   const model::Model model = selection::TouchPartOf(given);
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction other, workspace.predictor->Run(model, true, true));
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Observations alone,
                               selection::UsableUnder(workspace, model, other, workspace.comparable));
   // Both models on the touches that both of them meet.
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const touches::Observations o,
-      selection::UsableUnder(workspace, model, other, workspace.observations->used));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Observations o,
+                              selection::UsableUnder(workspace, model, other, workspace.observations->used));
   report::Versus versus;
   versus.other_name = given.name;
   versus.other_hash = given.Hash();
-  versus.other = report::InMicroseconds(selection::QualityAsCompared(alone, touches::Residuals(alone, other)));
+  versus.other =
+      report::InMicroseconds(selection::QualityAsCompared(alone, touches::Residuals(alone, other)));
   const double sigma_s = data.noise_floor ? data.noise_floor->sigma * kSecondsPerMicrosecond : 0;
-  versus.difference = residuals::CompareModels(o, workspace.nominal, other, std::max(sigma_s, 1e-12),
-                                               workspace.input.seed);
+  versus.difference =
+      residuals::CompareModels(o, workspace.nominal, other, std::max(sigma_s, 1e-12), workspace.input.seed);
   const residuals::ModelDifference& d = versus.difference;
   const std::string interval =
-      absl::StrCat("by ", TimeInWords(std::abs(d.difference_s)), " (95 %: ",
-                   TimeInWords(std::min(std::abs(d.lower_s), std::abs(d.upper_s))), " to ",
+      absl::StrCat("by ", TimeInWords(std::abs(d.difference_s)),
+                   " (95 %: ", TimeInWords(std::min(std::abs(d.lower_s), std::abs(d.upper_s))), " to ",
                    TimeInWords(std::max(std::abs(d.lower_s), std::abs(d.upper_s))), ")");
-  const bool less = d.upper_s < 0, more = d.lower_s > 0;
+  const bool less = d.upper_s<0, more = d.lower_s> 0;
   if (d.lower_s == 0 && d.upper_s == 0)
     versus.words = "Both models expect the same of these touches.";
   else if (less || more)
@@ -179,7 +186,8 @@ absl::StatusOr<report::Versus> CompareWithOther(const selection::Workspace& work
                                 less ? workspace.input.model->name : given.name, "', ", interval, ".");
   else
     versus.words = absl::StrFormat(
-        "These touches do not say which model errs less: the RMSE of '%s' differs by %.3g us (95 %%: %.3g to %.3g).",
+        "These touches do not say which model errs less: the RMSE of '%s' differs by %.3g us (95 %%: %.3g to "
+        "%.3g).",
         given.name, Microseconds(d.difference_s), Microseconds(d.lower_s), Microseconds(d.upper_s));
   return versus;
 }

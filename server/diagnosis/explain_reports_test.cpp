@@ -38,7 +38,8 @@ TEST(ExplainTouches, AnotherEffectNamesTheOneThatExplainsThemBetter) {
 
 TEST(ExplainTouches, AnEffectThatTheTouchesDoNotAskForIsExcludedBeyondItsInterval) {
   const report::Diagnosis diagnosis = Explained("return_hysteresis");
-  EXPECT_THAT(diagnosis.summary, testing::AnyOf(HasSubstr("do not ask for it"), HasSubstr("changes nothing")));
+  EXPECT_THAT(diagnosis.summary,
+              testing::AnyOf(HasSubstr("do not ask for it"), HasSubstr("changes nothing")));
 }
 
 TEST(ExplainTouches, NoiseIsNoEffectOfTheExpectation) {

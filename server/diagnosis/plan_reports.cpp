@@ -44,14 +44,15 @@ std::string Summary(const Fates& fates) {
   if (!fates.missed.empty())
     absl::StrAppend(&text, " Not found at that size: ", absl::StrJoin(fates.missed, ", "), ".");
   if (!fates.untold.empty())
-    absl::StrAppend(&text, " Found, and never told from what resembles them: ",
-                    absl::StrJoin(fates.untold, ", "), ".");
+    absl::StrAppend(
+        &text, " Found, and never told from what resembles them: ", absl::StrJoin(fates.untold, ", "), ".");
   return text;
 }
 
 }  // namespace
 
-absl::StatusOr<report::Diagnosis> CheckTouchPlan(const DiagnosisInput& input, const design::PlanQuestion& question,
+absl::StatusOr<report::Diagnosis> CheckTouchPlan(const DiagnosisInput& input,
+                                                 const design::PlanQuestion& question,
                                                  const DiagnosisContext& context) {
   DiagnosisInput touches = input;
   touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
@@ -66,11 +67,12 @@ absl::StatusOr<report::Diagnosis> CheckTouchPlan(const DiagnosisInput& input, co
   diagnosis.detectable = std::move(check.values);
   diagnosis.next.assign(check.proposed.begin(), check.proposed.end());
   if (question.improve > 0 && check.proposed.empty())
-    diagnosis.warnings.push_back(
-        question.find.empty()
-            ? absl::StrCat("No touch of this rig tells ", question.between[0], " from ", question.between[1], ": ",
-                           engine::DiscriminatingMeasurement(question.between))
-            : absl::StrCat("No touch of this rig shows ", question.find, " better than those of the plan do."));
+    diagnosis.warnings.push_back(question.find.empty()
+                                     ? absl::StrCat("No touch of this rig tells ", question.between[0],
+                                                    " from ", question.between[1], ": ",
+                                                    engine::DiscriminatingMeasurement(question.between))
+                                     : absl::StrCat("No touch of this rig shows ", question.find,
+                                                    " better than those of the plan do."));
   return diagnosis;
 }
 

@@ -9,7 +9,8 @@
 namespace touchstone::diagnosis {
 
 // See Check (diagnose.h).
-absl::StatusOr<report::Diagnosis> CheckTouchPlan(const DiagnosisInput& input, const design::PlanQuestion& question,
+absl::StatusOr<report::Diagnosis> CheckTouchPlan(const DiagnosisInput& input,
+                                                 const design::PlanQuestion& question,
                                                  const DiagnosisContext& context);
 
 }  // namespace touchstone::diagnosis

@@ -40,7 +40,8 @@ int Named(touches::HiddenRig rig, const std::string& effect, const std::string& 
     EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
     bool is_named = false;
     for (const report::Step& step : diagnosis->steps)
-      is_named |= step.effect == effect || std::count(step.equivalent.begin(), step.equivalent.end(), effect) > 0;
+      is_named |=
+          step.effect == effect || std::count(step.equivalent.begin(), step.equivalent.end(), effect) > 0;
     named += is_named;
   }
   return named;
@@ -67,13 +68,11 @@ TEST_P(PredictedPower, IsThatOfDiagnoses) {
   EXPECT_NEAR(named, engine::kDetectionPower * kSets, 6.5) << effect << " " << value;
 }
 
-INSTANTIATE_TEST_SUITE_P(Effects, PredictedPower,
-                         testing::Values(std::pair("tip_radius", "radius_mm=#"),
-                                         std::pair("gravity_sag", "drop_mm=#"),
-                                         std::pair("speed_error", "relative=#"),
-                                         std::pair("object_push", "shift_mm=#"),
-                                         std::pair("return_hysteresis", "fraction=#"),
-                                         std::pair("oblique_slip", "travel_mm=#")));
+INSTANTIATE_TEST_SUITE_P(
+    Effects, PredictedPower,
+    testing::Values(std::pair("tip_radius", "radius_mm=#"), std::pair("gravity_sag", "drop_mm=#"),
+                    std::pair("speed_error", "relative=#"), std::pair("object_push", "shift_mm=#"),
+                    std::pair("return_hysteresis", "fraction=#"), std::pair("oblique_slip", "travel_mm=#")));
 
 }  // namespace
 }  // namespace touchstone::diagnosis

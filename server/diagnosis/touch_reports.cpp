@@ -226,8 +226,8 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
                        &diagnosis.data[0]);
   AddSentences(&diagnosis);
   TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.detectable,
-                              engine::FindDetectable(*selection.search, selection.fit, selection.initial_effects,
-                                                     selection.fit.sigma));
+                              engine::FindDetectable(*selection.search, selection.fit,
+                                                     selection.initial_effects, selection.fit.sigma));
   TOUCHSTONE_RETURN_IF_ERROR(AddNextTouches(*workspace, selection, ladder, max_touches, always, &diagnosis));
   if (touches_needed > 0) {
     // So few touches say where to touch next, and no more.

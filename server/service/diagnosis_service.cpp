@@ -210,7 +210,8 @@ grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::C
   if (request->has_other_model()) {
     absl::StatusOr<std::shared_ptr<const model::Model>> read = FromProto(request->other_model(), *resources_);
     if (!read.ok())
-      return ToGrpc(absl::Status(read.status().code(), absl::StrCat("other_model: ", read.status().message())));
+      return ToGrpc(
+          absl::Status(read.status().code(), absl::StrCat("other_model: ", read.status().message())));
     other = *std::move(read);
   }
   const Work work = {[&other](const diagnosis::DiagnosisInput& input,
@@ -239,8 +240,8 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
   }
   v1::Report report;
   const Work work = {[with_surface_map = request->with_surface_map()](
-                        const diagnosis::DiagnosisInput& input,
-                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+                         const diagnosis::DiagnosisInput& input,
+                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     diagnosis::DiagnosisInput asked = input;
     asked.with_surface_map = with_surface_map;
     return AsReport(touchstone::diagnosis::Diagnose(asked, how));
@@ -264,7 +265,7 @@ grpc::Status DiagnosisService::Propose(grpc::ServerContext* context, const v1::P
       request->photographs() == 0 ? kDefaultProposedPhotographs : static_cast<int>(request->photographs());
   const bool touches_asked = request->touches() > 0, photographs_asked = request->photographs() > 0;
   const Work work = {[=](const diagnosis::DiagnosisInput& input,
-                        const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
     const bool both = input.set != nullptr && input.images != nullptr;
     if (both && touches_asked && photographs_asked)
       return absl::InvalidArgumentError(
@@ -301,20 +302,21 @@ grpc::Status DiagnosisService::Check(grpc::ServerContext* context, const v1::Che
   question.improve = static_cast<int>(request->improve());
   question.find = request->find();
   question.between = {request->between().begin(), request->between().end()};
-  const Work work = {[&question](const diagnosis::DiagnosisInput& input,
-                                 const diagnosis::DiagnosisContext& how) {
-                       return AsReport(touchstone::diagnosis::Check(input, question, how));
-                     },
-                     TimesOfSet::kNotRead};
+  const Work work = {
+      [&question](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
+        return AsReport(touchstone::diagnosis::Check(input, question, how));
+      },
+      TimesOfSet::kNotRead};
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }
 
 grpc::Status DiagnosisService::Explain(grpc::ServerContext* context, const v1::ExplainRequest* request,
                                        grpc::ServerWriter<v1::ExplainResponse>* writer) {
-  const Work work = {[request](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
-    return AsReport(touchstone::diagnosis::Explain(input, request->effect(), how));
-  }};
+  const Work work = {
+      [request](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
+        return AsReport(touchstone::diagnosis::Explain(input, request->effect(), how));
+      }};
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
 }

@@ -33,22 +33,23 @@ absl::StatusOr<double> NoiseOf(const selection::Workspace& workspace) {
                               workspace.predictor->Draw(model, workspace.input.seed));
   touches::Observations reported = *workspace.observations;
   reported.time_s = drawn;
-  const double sigma_s =
-      touches::Rmse(reported, touches::Residuals(reported, workspace.nominal));
+  const double sigma_s = touches::Rmse(reported, touches::Residuals(reported, workspace.nominal));
   if (sigma_s > 0) return sigma_s;
-  return absl::InvalidArgumentError(absl::StrCat(
-      "the model '", model.name,
-      "' has no noise, and without noise every effect is found at any size: give the noise of one finger's time "
-      "(--noise 5, in us), or add gaussian_noise to the model"));
+  return absl::InvalidArgumentError(absl::StrCat("the model '", model.name,
+                                                 "' has no noise, and without noise every effect is found at "
+                                                 "any size: give the noise of one finger's time "
+                                                 "(--noise 5, in us), or add gaussian_noise to the model"));
 }
 
 absl::Status CheckQuestion(const PlanQuestion& question) {
   if (question.improve > 0 && question.find.empty() == question.between.empty())
     return absl::InvalidArgumentError(
-        "which touches help most depends on the question: find (one effect) or between (two effects) was expected");
+        "which touches help most depends on the question: find (one effect) or between (two effects) was "
+        "expected");
   if (question.improve == 0 && !(question.find.empty() && question.between.empty()))
     return absl::InvalidArgumentError("improve = 0: how many touches to propose was expected");
-  if (!question.between.empty() && (question.between.size() != 2 || question.between[0] == question.between[1]))
+  if (!question.between.empty() &&
+      (question.between.size() != 2 || question.between[0] == question.between[1]))
     return absl::InvalidArgumentError(absl::StrCat("between: '", absl::StrJoin(question.between, ","),
                                                    "': two different effects were expected"));
   return absl::OkStatus();
@@ -66,15 +67,16 @@ absl::StatusOr<engine::DetectableValue> BestOf(const std::vector<engine::Detecta
   }
   if (best != nullptr) return *best;
   if (std::find(names.begin(), names.end(), effect) != names.end())
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", effect, "' changes no touch of this plan at any size, and further ones like it do not help"));
-  return absl::InvalidArgumentError(absl::StrCat("'", effect,
-                                                 "' is no effect that this model lacks and touches can show; one of ",
-                                                 absl::StrJoin(names, ", "), " was expected"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "'", effect, "' changes no touch of this plan at any size, and further ones like it do not help"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("'", effect, "' is no effect that this model lacks and touches can show; one of ",
+                   absl::StrJoin(names, ", "), " was expected"));
 }
 
 absl::StatusOr<std::vector<ProposedTouch>> Improve(const PlanCheck& check, const PlanQuestion& question,
-                                                   const engine::StepwiseSearch& search, const engine::Fit& given) {
+                                                   const engine::StepwiseSearch& search,
+                                                   const engine::Fit& given) {
   const selection::Workspace& workspace = *check.workspace;
   std::vector<engine::ExplanationsLeft::NamedModel> models;
   if (!question.find.empty()) {
@@ -99,7 +101,8 @@ absl::StatusOr<PlanCheck> CheckPlan(const DiagnosisInput& input, const PlanQuest
                                     const DiagnosisContext& context) {
   if (input.set == nullptr || input.images != nullptr || !input.set->has_poses)
     return absl::InvalidArgumentError(
-        "a check takes a plan of touches with poses; of photographs and of sets without poses it knows nothing");
+        "a check takes a plan of touches with poses; of photographs and of sets without poses it knows "
+        "nothing");
   TOUCHSTONE_RETURN_IF_ERROR(CheckQuestion(question));
   PlanCheck check;
   TOUCHSTONE_ASSIGN_OR_RETURN(check.workspace, selection::MakeWorkspace(WithTimes(input), context));
@@ -124,8 +127,9 @@ absl::StatusOr<PlanCheck> CheckPlan(const DiagnosisInput& input, const PlanQuest
       engine::FitModel(workspace.experiment,
                        engine::Parameterization(*workspace.input.model, workspace.searched->objects), 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      check.values, engine::FindDetectable(search, given, static_cast<int>(workspace.input.model->effects.size()),
-                                           check.sigma_s));
+      check.values,
+      engine::FindDetectable(search, given, static_cast<int>(workspace.input.model->effects.size()),
+                             check.sigma_s));
   if (question.improve > 0) {
     progress("proposing", 0.7);
     TOUCHSTONE_ASSIGN_OR_RETURN(check.proposed, Improve(check, question, search, given));

@@ -87,8 +87,8 @@ TEST(CheckPlan, ProposedTouchesFindTheEffectAtASmallerSize) {
   auto more = std::make_shared<session::MeasurementSet>(*input.set);
   for (const ProposedTouch& proposed : check.proposed) {
     more->touch.push_back(more->touch.size());
-    more->object.push_back(static_cast<int>(std::find(more->objects.begin(), more->objects.end(), proposed.object) -
-                                            more->objects.begin()));
+    more->object.push_back(static_cast<int>(
+        std::find(more->objects.begin(), more->objects.end(), proposed.object) - more->objects.begin()));
     more->target_m.push_back(proposed.touch.target_m);
     more->approach.push_back(proposed.touch.approach);
     more->lateral.push_back(proposed.touch.lateral);

@@ -36,10 +36,10 @@ struct Span {
 
 // What an effect of one size leads to.
 struct Expected {
-  Eigen::VectorXd point;       // of the extension's parameters
-  Eigen::VectorXd response;    // rows
-  double ratio = 0;            // twice the gain in log likelihood, without noise
-  double gain_nats = 0;        // in log evidence, likewise
+  Eigen::VectorXd point;     // of the extension's parameters
+  Eigen::VectorXd response;  // rows
+  double ratio = 0;          // twice the gain in log likelihood, without noise
+  double gain_nats = 0;      // in log evidence, likewise
   double log_evidence = 0, log_likelihood = 0;
   Eigen::MatrixXd covariance;  // of the parameters
   double power = 0;
@@ -67,7 +67,8 @@ class Detector {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           const Eigen::MatrixXd columns,
           Derivatives(experiment_, extension.start, extension.start.Start(), given_.predicted, own_));
-      spans_.push_back({static_cast<int>(m), static_cast<int>(wide.cols()), static_cast<int>(columns.cols())});
+      spans_.push_back(
+          {static_cast<int>(m), static_cast<int>(wide.cols()), static_cast<int>(columns.cols())});
       wide.conservativeResize(Eigen::NoChange, wide.cols() + columns.cols());
       wide.rightCols(columns.cols()) = columns;
     }
@@ -141,7 +142,8 @@ class Detector {
     Expected e;
     e.point = PointAt(extension, i, size, together);
     const model::Model model = extension.start.At(e.point);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted, experiment_.observations->Predict(model));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted,
+                                experiment_.observations->Predict(model));
     e.response = experiment_.observations->Change(given_.predicted, predicted);
     // Before: nothing stands for the response. After: the effect stands where it acts, and leaves the noise.
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd own,
@@ -162,9 +164,8 @@ class Detector {
       }
       after.push_back(std::move(gram));
     }
-    const LaplaceEvidence with =
-        ComputeLaplaceEvidence(likelihood(), after, InOrder(1 + extension.start.size()),
-                               extension.start.parameters(), e.point);
+    const LaplaceEvidence with = ComputeLaplaceEvidence(
+        likelihood(), after, InOrder(1 + extension.start.size()), extension.start.parameters(), e.point);
     e.log_evidence = with.log_evidence;
     e.log_likelihood = with.log_likelihood;
     e.covariance = with.covariance;
@@ -238,8 +239,8 @@ class Detector {
       std::vector<Eigen::MatrixXd> grams = Grams(likelihood(), likelihood().Prepare(values));
       for (int s = 0; s < static_cast<int>(grams.size()); ++s) grams[s](0, 0) += NoiseSquares(s);
       rival.point = point;
-      rival.evidence = ComputeLaplaceEvidence(likelihood(), grams, InOrder(1 + start.size()), start.parameters(),
-                                              point);
+      rival.evidence =
+          ComputeLaplaceEvidence(likelihood(), grams, InOrder(1 + start.size()), start.parameters(), point);
       if (arrived) break;
     }
     return rival;
@@ -296,7 +297,8 @@ class Detector {
     // Twice the difference in log likelihood has this mean and, by the noise, four times it for a variance.
     const double z = kNormalQuantile80;
     const double needed = std::max(search_.rules().equivalent_nats - occam, 0.0);
-    const double root = z + std::sqrt(z * z + 2 * needed);  // of 2 likelier, where likelier - z sqrt(2 likelier) = needed
+    const double root =
+        z + std::sqrt(z * z + 2 * needed);  // of 2 likelier, where likelier - z sqrt(2 likelier) = needed
     return 2 * likelier / std::max(root * root, 1e-12);
   }
 
@@ -336,11 +338,15 @@ class Detector {
     value.power_at_typical = e.power;
 
     double size = typical;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, Grow(m, i, reach, [&](const Expected& at) -> absl::StatusOr<double> {
-                                  const int values = extension.start.size() - own_;
-                                  const double needed = RatioNeeded(values, 0.5 * at.ratio - at.gain_nats);
-                                  return at.ratio / NoncentralityForTail(needed, values, kDetectionPower);
-                                }, &size, &e));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const bool found, Grow(
+                              m, i, reach,
+                              [&](const Expected& at) -> absl::StatusOr<double> {
+                                const int values = extension.start.size() - own_;
+                                const double needed = RatioNeeded(values, 0.5 * at.ratio - at.gain_nats);
+                                return at.ratio / NoncentralityForTail(needed, values, kDetectionPower);
+                              },
+                              &size, &e));
     if (found) {
       value.found_from = in_file(size);
       set_error(e, size);
@@ -358,14 +364,15 @@ class Detector {
     if (!found) return value;
     const bool alike = 1 - value.correlation * value.correlation < kAlike * kAlike;
     if (ToldApart(e, rival, fitted, alike) < 1) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool told,
-                                  Grow(m, i, reach,
-                                       [&](const Expected& at) -> absl::StatusOr<double> {
-                                         TOUCHSTONE_ASSIGN_OR_RETURN(const FittedRival again,
-                                                                     Fitted(at.response, rival));
-                                         return ToldApart(at, rival, again, alike);
-                                       },
-                                       &size, &e));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool told, Grow(
+                                                       m, i, reach,
+                                                       [&](const Expected& at) -> absl::StatusOr<double> {
+                                                         TOUCHSTONE_ASSIGN_OR_RETURN(
+                                                             const FittedRival again,
+                                                             Fitted(at.response, rival));
+                                                         return ToldApart(at, rival, again, alike);
+                                                       },
+                                                       &size, &e));
       if (!told) return value;
     }
     value.told_from = in_file(size);
@@ -374,7 +381,8 @@ class Detector {
 
   // Changes *size until what grows as its square is 1 there. False: it is not, up to `reach`.
   template <typename Measure>
-  absl::StatusOr<bool> Grow(int m, int i, double reach, const Measure& measure, double* size, Expected* e) const {
+  absl::StatusOr<bool> Grow(int m, int i, double reach, const Measure& measure, double* size,
+                            Expected* e) const {
     for (int step = 0; step < kMaxSteps; ++step) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const double reached, measure(*e));
       const double factor = std::clamp(1 / std::sqrt(std::max(reached, 1e-12)), 1 / kMaxGrowth, kMaxGrowth);

@@ -35,9 +35,9 @@ absl::Status NotAmong(const std::vector<Extension>& extensions, const std::strin
   for (const Extension& extension : extensions)
     if (!extension.nameless && std::find(names.begin(), names.end(), extension.name) == names.end())
       names.push_back(extension.name);
-  return absl::NotFoundError(absl::StrCat("'", effect,
-                                          "' is no effect that changes what is expected of these measurements; one of ",
-                                          absl::StrJoin(names, ", "), " was expected"));
+  return absl::NotFoundError(
+      absl::StrCat("'", effect, "' is no effect that changes what is expected of these measurements; one of ",
+                   absl::StrJoin(names, ", "), " was expected"));
 }
 
 // Of values that a bound holds where they change nothing: the size beyond which the likelihood falls by more than a 95 %
@@ -77,20 +77,23 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
         extension.name == explained.effect)
       continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
-                                Derivatives(experiment, extension.start, extension.start.Start(), initial.predicted,
-                                            initial.model.size()));
+                                Derivatives(experiment, extension.start, extension.start.Start(),
+                                            initial.predicted, initial.model.size()));
     const double share = ShareExplained(columns, response);
     const double gain_nats = extension.log_evidence - initial.log_evidence;
     // What gains nothing would have to act the other way.
     if (share < kWorthNaming || !(gain_nats > 0)) continue;
-    const std::string name = extension.candidate < 0 ? absl::StrCat(kGivenPrefix, extension.name) : extension.name;
-    const auto same = std::find_if(taken.begin(), taken.end(), [&](const TakenOver& t) { return t.effect == name; });
+    const std::string name =
+        extension.candidate < 0 ? absl::StrCat(kGivenPrefix, extension.name) : extension.name;
+    const auto same =
+        std::find_if(taken.begin(), taken.end(), [&](const TakenOver& t) { return t.effect == name; });
     if (same == taken.end())
       taken.push_back({name, share, gain_nats});
     else if (share > same->share)  // with a value per object
       same->share = share, same->gain_nats = gain_nats;
   }
-  std::stable_sort(taken.begin(), taken.end(), [](const TakenOver& a, const TakenOver& b) { return a.share > b.share; });
+  std::stable_sort(taken.begin(), taken.end(),
+                   [](const TakenOver& a, const TakenOver& b) { return a.share > b.share; });
   if (taken.size() > kMaxTakenOver) taken.resize(kMaxTakenOver);
   return taken;
 }
@@ -99,7 +102,8 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
 
 absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, const Fit& initial,
                                                 int initial_effects, const std::string& effect) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions, search.Score(initial, initial_effects));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
+                              search.Score(initial, initial_effects));
   const Extension* extension = Find(extensions, effect);
   if (extension == nullptr) return NotAmong(extensions, effect);
   EffectExplanation explained;

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kToldAtOnce = 1.05;  // of the size that is found
 
-void WriteDeciding(const std::vector<residuals::DecidingTouch>& touches, const std::vector<std::string>& fingers,
+void WriteDeciding(const std::vector<residuals::DecidingTouch>& touches,
+                   const std::vector<std::string>& fingers,
                    google::protobuf::RepeatedPtrField<v1::DecidingMeasurement>* messages) {
   for (const residuals::DecidingTouch& touch : touches) {
     v1::DecidingMeasurement* message = messages->Add();
@@ -65,7 +66,8 @@ void WriteExplained(const Explained& explained, const std::vector<std::string>& 
   message->set_words(explained.words);
 }
 
-void WriteVersus(const Versus& versus, const std::vector<std::string>& fingers, v1::ModelComparison* message) {
+void WriteVersus(const Versus& versus, const std::vector<std::string>& fingers,
+                 v1::ModelComparison* message) {
   const residuals::ModelDifference& difference = versus.difference;
   message->set_other_name(versus.other_name);
   message->set_other_hash(versus.other_hash);
@@ -74,8 +76,10 @@ void WriteVersus(const Versus& versus, const std::vector<std::string>& fingers, 
   message->set_lower(Microseconds(difference.lower_s));
   message->set_upper(Microseconds(difference.upper_s));
   message->set_other_better(difference.other_better);
-  for (const residuals::ErrorSlice& slice : difference.better) WriteSlice(SliceOf(slice), message->add_better());
-  for (const residuals::ErrorSlice& slice : difference.worse) WriteSlice(SliceOf(slice), message->add_worse());
+  for (const residuals::ErrorSlice& slice : difference.better)
+    WriteSlice(SliceOf(slice), message->add_better());
+  for (const residuals::ErrorSlice& slice : difference.worse)
+    WriteSlice(SliceOf(slice), message->add_worse());
   WriteDeciding(difference.deciding, fingers, message->mutable_deciding());
   message->set_words(versus.words);
 }

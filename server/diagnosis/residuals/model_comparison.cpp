@@ -74,7 +74,8 @@ void Bootstrap(const std::vector<PoseSums>& poses, uint64_t seed, ModelDifferenc
 
 }  // namespace
 
-std::vector<DecidingTouch> FindDecidingTouches(const touches::Observations& o, const std::vector<double>& before,
+std::vector<DecidingTouch> FindDecidingTouches(const touches::Observations& o,
+                                               const std::vector<double>& before,
                                                const std::vector<double>& after, double sigma_s, size_t count,
                                                bool rises) {
   std::vector<DecidingTouch> touches;
@@ -118,10 +119,9 @@ ModelDifference CompareModels(const touches::Observations& o, const touches::Pre
   result.deciding = FindDecidingTouches(o, before, after, sigma_s, kDeciding, false);
   const std::vector<DecidingTouch> rises = FindDecidingTouches(o, before, after, sigma_s, kDeciding, true);
   result.deciding.insert(result.deciding.end(), rises.begin(), rises.end());
-  std::stable_sort(result.deciding.begin(), result.deciding.end(),
-                   [](const DecidingTouch& a, const DecidingTouch& b) {
-                     return std::abs(a.fall) > std::abs(b.fall);
-                   });
+  std::stable_sort(
+      result.deciding.begin(), result.deciding.end(),
+      [](const DecidingTouch& a, const DecidingTouch& b) { return std::abs(a.fall) > std::abs(b.fall); });
   if (result.deciding.size() > kDeciding) result.deciding.resize(kDeciding);
   return result;
 }

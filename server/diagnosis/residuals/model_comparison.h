@@ -15,8 +15,8 @@ namespace touchstone::diagnosis::residuals {
 struct DecidingTouch {
   uint64_t touch = 0;  // its number in the measurement file
   std::string object;
-  double fall = 0;     // of the touch's sum of squared residuals, over the noise's square; < 0: it rises
-  int finger = 0;      // that holds most of it
+  double fall = 0;  // of the touch's sum of squared residuals, over the noise's square; < 0: it rises
+  int finger = 0;   // that holds most of it
   double before_s = 0, after_s = 0;  // its residuals
 };
 

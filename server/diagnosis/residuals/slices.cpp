@@ -75,7 +75,8 @@ class SliceFinder {
   // The excess of one finger's residual over what is no error of the model, s^2. `compared`: fingers of the touch.
   double Excess(int k, int finger, int compared) const {
     const size_t at = static_cast<size_t>(k) * observations_.fingers + finger;
-    const double no_error_s2 = less_ == nullptr ? NoiseShare(sigma_s_, compared) : (*less_)[at] * (*less_)[at];
+    const double no_error_s2 =
+        less_ == nullptr ? NoiseShare(sigma_s_, compared) : (*less_)[at] * (*less_)[at];
     return residuals_[at] * residuals_[at] - no_error_s2;
   }
 
@@ -256,8 +257,8 @@ std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
 
 std::vector<ErrorSlice> FindSlicesBeyond(const touches::Observations& observations,
                                          const touches::Prediction& prediction,
-                                         const std::vector<double>& residuals, const std::vector<double>& other,
-                                         double sigma_s) {
+                                         const std::vector<double>& residuals,
+                                         const std::vector<double>& other, double sigma_s) {
   return SliceFinder(observations, prediction, residuals, sigma_s, &other).Find();
 }
 

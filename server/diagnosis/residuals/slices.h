@@ -36,7 +36,7 @@ std::vector<ErrorSlice> FindSlices(const touches::Observations& observations,
 // squared residuals less that of the other's. share_of_excess_error: of the whole set's difference.
 std::vector<ErrorSlice> FindSlicesBeyond(const touches::Observations& observations,
                                          const touches::Prediction& prediction,
-                                         const std::vector<double>& residuals, const std::vector<double>& other,
-                                         double sigma_s);
+                                         const std::vector<double>& residuals,
+                                         const std::vector<double>& other, double sigma_s);
 
 }  // namespace touchstone::diagnosis::residuals
