@@ -72,8 +72,7 @@ absl::StatusOr<std::unique_ptr<ChildProgram>> ChildProgram::Start(const std::str
   for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);
   const int input = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-  const int output =
-      log.empty() ? -1 : ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  const int output = log.empty() ? -1 : ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (!log.empty() && output < 0)
     return absl::FailedPreconditionError(absl::StrCat(log, ": cannot be written: ", std::strerror(errno)));
   const pid_t parent = ::getpid(), pid = ::fork();
@@ -116,7 +115,8 @@ absl::StatusOr<std::string> ChildProgram::WaitUntilReady(const std::string& read
       return line.substr(0, line.find(' '));
     }
     if (ended || Clock::now() > until)
-      return absl::UnavailableError(absl::StrCat(name_, ended ? " ended before it was ready" : " is not ready",
+      return absl::UnavailableError(absl::StrCat(name_,
+                                                 ended ? " ended before it was ready" : " is not ready",
                                                  "; the end of ", log_, ":\n", EndOfLog(log_)));
     std::this_thread::sleep_for(kLookEvery);
   }

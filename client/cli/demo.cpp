@@ -48,10 +48,11 @@ class Demo {
                  {"log", log_},
                  {"took_s", took_s}});
     } else {
-      Say(absl::StrCat(
-          "\nDone in ", absl::StrFormat("%.0f", took_s), " s. What the model lacked, in any browser: ",
-          Path("report.html"), "\nThe same page live, to find, add and undo: touchstone workbench ",
-          ShellWord(Path("session.db")), " --model ", ShellWord(Path("model.yaml")), " --open\n"));
+      Say(absl::StrCat("\nDone in ", absl::StrFormat("%.0f", took_s),
+                       " s. What the model lacked, in any browser: ", Path("report.html"),
+                       "\nThe same page live, to find, add and undo: touchstone workbench ",
+                       ShellWord(Path("session.db")), " --model ", ShellWord(Path("model.yaml")),
+                       " --open\n"));
     }
     if (flags_.open) OpenInBrowser(cli_, Path("report.html"));
     return absl::OkStatus();
@@ -122,8 +123,8 @@ class Demo {
     TOUCHSTONE_RETURN_IF_ERROR(Command({"rig", "status", "--server", address, "--wait-s", "60"}));
     TOUCHSTONE_RETURN_IF_ERROR(
         Command({"plan", flags_.objects, "--plan", "faces", "-o", Path("plan.csv"), "--force"}));
-    TOUCHSTONE_RETURN_IF_ERROR(Command({"rig", "dry-run", Path("plan.csv"), "--server", address, "-o",
-                                        Path("path.svg"), "--force"}));
+    TOUCHSTONE_RETURN_IF_ERROR(Command(
+        {"rig", "dry-run", Path("plan.csv"), "--server", address, "-o", Path("path.svg"), "--force"}));
     TOUCHSTONE_RETURN_IF_ERROR(
         Command({"rig", "run", Path("plan.csv"), "--server", address, "-o", Path("session.db")}));
     TOUCHSTONE_RETURN_IF_ERROR(gateway->Stop());
@@ -137,8 +138,8 @@ class Demo {
     Say("\n== Find what the model lacks: the session of the emulated rig, diagnosed\n");
     const std::string model = Path("model.yaml"), better = Path("better.yaml");
     TOUCHSTONE_RETURN_IF_ERROR(Command({"model", "new", "-o", Path("nominal.yaml"), "--force"}));
-    TOUCHSTONE_RETURN_IF_ERROR(Command({"model", "add", Path("nominal.yaml"), "gaussian_noise",
-                                        "sigma_us=5000", "-o", model, "--force"}));
+    TOUCHSTONE_RETURN_IF_ERROR(Command(
+        {"model", "add", Path("nominal.yaml"), "gaussian_noise", "sigma_us=5000", "-o", model, "--force"}));
     TOUCHSTONE_RETURN_IF_ERROR(Command({"diagnose", Path("session.db"), "--model", model, "--html",
                                         Path("report.html"), "--save-model", better, "--force"}));
     return Command({"model", "diff", model, better});
@@ -154,13 +155,13 @@ class Demo {
 
 void AddDemo(Cli* cli) {
   auto flags = std::make_shared<DemoFlags>();
-  CLI::App* command = cli->AddCommand(
-      nullptr, "demo",
-      "An emulated rig that hides an effect is touched through the gateway; the diagnosis finds the effect, and a page shows "
-      "it. Needs no rig, no server and no other file.",
-      "touchstone demo --open\n"
-      "touchstone demo -o first --objects lat00,lat10,lat20",
-      [cli, flags] { return Demo(*cli, *flags).Run(); });
+  CLI::App* command = cli->AddCommand(nullptr, "demo",
+                                      "An emulated rig that hides an effect is touched through the gateway; "
+                                      "the diagnosis finds the effect, and a page shows "
+                                      "it. Needs no rig, no server and no other file.",
+                                      "touchstone demo --open\n"
+                                      "touchstone demo -o first --objects lat00,lat10,lat20",
+                                      [cli, flags] { return Demo(*cli, *flags).Run(); });
   cli->AddOutput(command, "-o,--out", &flags->folder,
                  "Folder for the session, the models and report.html; made if it is not there",
                  OutputKind::kPrefix)

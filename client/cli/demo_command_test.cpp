@@ -70,7 +70,8 @@ TEST_F(DemoCommandTest, WhatIsThereStays) {
   // Not even --force takes a folder that no demo made.
   fs::create_directory(Path("mine/rig"));
   Write("mine/rig/gateway.toml", "mine");
-  EXPECT_THAT(Run({"demo", "-o", "mine", "--force"}).err, HasSubstr("mine/rig exists already and is no demo's"));
+  EXPECT_THAT(Run({"demo", "-o", "mine", "--force"}).err,
+              HasSubstr("mine/rig exists already and is no demo's"));
   EXPECT_EQ(Read("mine/rig/gateway.toml"), "mine");
 }
 
@@ -81,8 +82,10 @@ TEST_F(DemoCommandTest, ProgramThatIsMissingIsNamed) {
   const std::string command =
       "cd '" + Path("") + "' && ./touchstone demo > out 2> err; echo $? >> err; ./touchstone doctor > doctor";
   ASSERT_EQ(std::system(command.c_str()), 0);
-  EXPECT_THAT(Read("err"), AllOf(HasSubstr("/touchstone-rig-emulator is needed and is not there"), HasSubstr("\n2\n")));
-  EXPECT_THAT(Read("doctor"), HasSubstr("!!  Programs   touchstone-server, touchstone-gateway, touchstone-rig-emulator"));
+  EXPECT_THAT(Read("err"),
+              AllOf(HasSubstr("/touchstone-rig-emulator is needed and is not there"), HasSubstr("\n2\n")));
+  EXPECT_THAT(Read("doctor"),
+              HasSubstr("!!  Programs   touchstone-server, touchstone-gateway, touchstone-rig-emulator"));
 }
 
 }  // namespace

@@ -147,7 +147,8 @@ class Doctor {
     else
       ::close(terminal);
     const absl::StatusOr<absl::string_view> page = workbench::PageTemplate();
-    Add("Page", page.ok(), page.ok() ? "built in: --html and workbench" : std::string(page.status().message()));
+    Add("Page", page.ok(),
+        page.ok() ? "built in: --html and workbench" : std::string(page.status().message()));
     json_["programs_missing"] = missing;
     json_["pseudo_terminals"] = terminal >= 0;
     json_["page"] = page.ok();
