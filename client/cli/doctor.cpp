@@ -19,6 +19,7 @@
 #include "client/workbench/page.h"
 #include "server/base/status.h"
 #include "server/base/version.h"
+#include "server/diagnosis/boards/board_pictures.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "server/service/channel.h"
@@ -87,6 +88,7 @@ class Doctor {
   absl::Status Run() {
     CheckProcessor();
     CheckPrograms();
+    CheckOpenCv();
     CheckRenderers();
     CheckProxy();
     const absl::Status source = CheckSource();
@@ -152,6 +154,17 @@ class Doctor {
     json_["programs_missing"] = missing;
     json_["pseudo_terminals"] = terminal >= 0;
     json_["page"] = page.ok();
+  }
+
+  void CheckOpenCv() {
+    // A build without OpenCV knows no folder of pictures, not even one that is not there.
+    const bool built_in = !absl::IsUnimplemented(
+        diagnosis::boards::ReadBoardPictures("", diagnosis::boards::BoardLayout()).status());
+    Add("OpenCV", built_in,
+        built_in ? "built in: a rig's camera, pictures of boards"
+                 : "not in this build: touchstone-gateway has no camera, and diagnose --board cannot find "
+                   "corners. All else works; for these build from the source");
+    json_["opencv"] = built_in;
   }
 
   void CheckRenderers() {
