@@ -97,7 +97,7 @@ install_current_python() {
     fi
     printf '%s' "$wanted" > "$into/installed"
   fi
-  "$into/bin/python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/touchstone-*.whl
+  "$into/bin/python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/touchstone_sim-*.whl
 }
 
 # The schemas of Kubernetes and of Argo's workflows, for tests/cluster, in an environment of their own. Where PyPI cannot be
@@ -163,16 +163,4 @@ start_server() {
   start_program touchstone-server "$1" 'listening on' --listen 127.0.0.1:0 "${@:2}" || return
   server_address=$announced
   "$python" deploy/wait-until-serving "$server_address" 30
-}
-
-# start_emulated_rig FOLDER SPEEDUP [flag of the emulator ...]: an emulated rig and the gateway before it, on free ports;
-# sets gateway_address. A test tool: nothing that it reports was measured on anything.
-start_emulated_rig() {
-  local folder=$1 speedup=$2
-  mkdir -p "$folder" || return
-  start_program touchstone-rig-emulator "$folder/emulator.out" 'ready' --dir "$folder" --speedup "$speedup" \
-    "${@:3}" || return
-  start_program touchstone-gateway "$folder/gateway.log" 'listening on' --config "$announced" --listen 127.0.0.1:0 || return
-  gateway_address=$announced
-  "$python" deploy/wait-until-serving "$gateway_address" 60
 }

@@ -176,6 +176,7 @@ std::string Counted(uint64_t count, const std::string& one, const std::string& m
 void PrintJson(const Json& json);
 
 // --- Commands: one file each
+void AddDemo(Cli* cli);
 void AddObjects(Cli* cli);
 void AddEffects(Cli* cli);
 void AddModel(Cli* cli);

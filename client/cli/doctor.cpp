@@ -3,14 +3,23 @@
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <set>
 #include <thread>
 
+#include "client/cli/child_program.h"
 #include "client/cli/common.h"
 #include "client/cli/terminal.h"
+#include "client/workbench/page.h"
 #include "server/base/status.h"
 #include "server/base/version.h"
+#include "server/diagnosis/boards/board_pictures.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
 #include "server/service/channel.h"
@@ -78,6 +87,8 @@ class Doctor {
 
   absl::Status Run() {
     CheckProcessor();
+    CheckPrograms();
+    CheckOpenCv();
     CheckRenderers();
     CheckProxy();
     const absl::Status source = CheckSource();
@@ -115,6 +126,45 @@ class Doctor {
     json_["build"] = {
         {"version", std::string(kVersion)}, {"instructions", used}, {"instructions_missing", missing}};
     json_["embree"] = geometry::EmbreeDescription();
+  }
+
+  // What touchstone demo needs: the other programs, a line to the emulated end effector, and the page.
+  void CheckPrograms() {
+    std::vector<std::string> missing;
+    for (const char* name :
+         {"touchstone-server", "touchstone-gateway", "touchstone-rig-emulator", "touchstone-probe"})
+      if (::access(PathBesideThisProgram(name).c_str(), X_OK) != 0) missing.push_back(name);
+    if (missing.empty())
+      Add("Programs", true, "server, gateway, emulated rig and probe lie beside this one");
+    else
+      Add("Programs", false,
+          absl::StrCat(absl::StrJoin(missing, ", "), missing.size() == 1 ? " is" : " are", " not there, in ",
+                       PathBesideThisProgram(""),
+                       "; touchstone demo needs the gateway and the emulated rig"));
+    const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY);
+    if (terminal < 0)
+      Add("Emulated rig", false,
+          absl::StrCat("there are no pseudo-terminals (/dev/ptmx: ", std::strerror(errno),
+                       "), which stand in for its serial line; touchstone demo needs them: mount devpts"));
+    else
+      ::close(terminal);
+    const absl::StatusOr<absl::string_view> page = workbench::PageTemplate();
+    Add("Page", page.ok(),
+        page.ok() ? "built in: --html and workbench" : std::string(page.status().message()));
+    json_["programs_missing"] = missing;
+    json_["pseudo_terminals"] = terminal >= 0;
+    json_["page"] = page.ok();
+  }
+
+  void CheckOpenCv() {
+    // A build without OpenCV knows no folder of pictures, not even one that is not there.
+    const bool built_in = !absl::IsUnimplemented(
+        diagnosis::boards::ReadBoardPictures("", diagnosis::boards::BoardLayout()).status());
+    Add("OpenCV", built_in,
+        built_in ? "built in: a rig's camera, pictures of boards"
+                 : "not in this build: touchstone-gateway has no camera, and diagnose --board cannot find "
+                   "corners. All else works; for these build from the source");
+    json_["opencv"] = built_in;
   }
 
   void CheckRenderers() {

@@ -12,6 +12,7 @@ namespace touchstone::cli {
 
 // One line a command; each is a file of its own.
 void AddCommands(Cli* cli) {
+  AddDemo(cli);
   AddObjects(cli);
   AddEffects(cli);
   AddModel(cli);

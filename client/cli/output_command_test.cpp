@@ -314,6 +314,8 @@ TEST_F(OutputsTest, EveryOptionThatNamesAnOutputIsInTheTable) {
   }
   // A secret is another one each time, and goes into a new file of its owner's alone, into no link and no device.
   EXPECT_EQ(commands.erase("token new"), 1u);
+  // A folder of files: demo_command_test.cpp.
+  EXPECT_EQ(commands.erase("demo"), 1u);
   EXPECT_EQ(commands, in_table);
 }
 

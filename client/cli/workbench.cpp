@@ -1,13 +1,10 @@
 // touchstone workbench: the live page. See where a model fails, add the effect that is missing, watch the error fall.
-#include <fcntl.h>
-#include <spawn.h>
-#include <unistd.h>
-
 #include <condition_variable>
 #include <cstdio>
 #include <iostream>
 #include <mutex>
 
+#include "client/cli/browser.h"
 #include "client/cli/comparison.h"
 #include "client/workbench_server/workbench.h"
 #include "server/base/status.h"
@@ -29,14 +26,6 @@ absl::Status NameModel(client::Connection* connection, v1::Evidence* evidence) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Model model, connection->Call(&v1::Models::Stub::GetModel, request));
   evidence->mutable_model()->set_yaml(model.yaml());
   return absl::OkStatus();
-}
-
-void OpenBrowser(const Cli& cli, const std::string& url) {
-  std::string program = "xdg-open", address = url;
-  char* const arguments[] = {program.data(), address.data(), nullptr};
-  pid_t child = 0;
-  if (::posix_spawnp(&child, program.c_str(), nullptr, nullptr, arguments, environ) != 0)
-    cli.Log("--open: there is no xdg-open here; open the address in a browser");
 }
 
 void WaitForInterrupt() {
@@ -79,7 +68,7 @@ absl::Status RunWorkbench(const Cli& cli, const WorkbenchFlags& options) {
   std::fflush(stdout);  // a reader of a pipe waits for it
   std::cout.flush();
   cli.Log("the page is at this address, for this machine alone; Ctrl-C ends it");
-  if (options.open) OpenBrowser(cli, page->Url());
+  if (options.open) OpenInBrowser(cli, page->Url());
   WaitForInterrupt();
   return absl::OkStatus();
 }

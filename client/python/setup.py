@@ -1,16 +1,28 @@
-"""Build hooks: the stubs of proto/touchstone/v1 are generated into every wheel and sdist. See pyproject.toml."""
+"""Builds wheel and sdist with the stubs of proto/touchstone/v1, generated here. See pyproject.toml.
+
+TOUCHSTONE_PROGRAMS names the folder that `cmake --install --component runtime` filled: then its programs, meshes and
+protocol become a part of the wheel, with a command for each program (deploy/package calls it so). Without it the wheel is
+the client alone, for every machine.
+"""
 
 import importlib.machinery
 import importlib.util
+import os
 import pathlib
+import re
+import shutil
 import sys
 
-from setuptools import setup
+from setuptools import Distribution, setup
 from setuptools.command.build_py import build_py
-from setuptools.command.egg_info import egg_info
-from setuptools.command.sdist import sdist
+
+try:
+    from setuptools.command.bdist_wheel import bdist_wheel
+except ImportError:  # before setuptools 70.1
+    from wheel.bdist_wheel import bdist_wheel  # type: ignore[no-redef,import-not-found]
 
 HERE = pathlib.Path(__file__).resolve().parent
+PROGRAMS = os.environ.get("TOUCHSTONE_PROGRAMS")
 
 
 def generate_stubs():
@@ -29,24 +41,49 @@ def generate_stubs():
         raise SystemExit(f"touchstone: {error}") from None
 
 
-class EggInfo(egg_info):
-    """Metadata comes first, and setuptools wants to see every package by then: a fresh clone has no stubs yet."""
-
-    def run(self):
-        generate_stubs()
-        super().run()
+def dependencies():
+    """What the stubs run with: those of newer generators refuse older libraries, and protobuf's two majors newer."""
+    grpc, protobuf = "grpcio>=1.51", "protobuf>=4.21"
+    stubs = "".join(path.read_text(encoding="utf-8") for path in sorted((HERE / "touchstone/v1").glob("*.py")))
+    found = re.search(r"GRPC_GENERATED_VERSION = '([\d.]+)'", stubs)
+    if found:
+        grpc = f"grpcio>={found[1]}"
+    found = re.search(r"ValidateProtobufRuntimeVersion\(\s*[\w.]+,\s*(\d+),\s*(\d+),\s*(\d+)", stubs)
+    if found:
+        protobuf = f"protobuf>={found[1]}.{found[2]}.{found[3]},<{int(found[1]) + 2}"
+    return [grpc, protobuf, "numpy>=1.21"]
 
 
 class BuildPy(build_py):
     def run(self):
-        generate_stubs()
         super().run()
+        if PROGRAMS:
+            for part in ("bin", "share"):
+                target = pathlib.Path(self.build_lib) / "touchstone_sim" / part
+                shutil.rmtree(target, ignore_errors=True)  # of an earlier build
+                shutil.copytree(pathlib.Path(PROGRAMS) / part, target)
 
 
-class Sdist(sdist):
-    def run(self):
-        generate_stubs()
-        super().run()
+class WheelOfPrograms(bdist_wheel):
+    """Of one system, whose programs it holds, but of every Python."""
+
+    def get_tag(self):
+        return ("py3", "none", super().get_tag()[2])
 
 
-setup(cmdclass={"egg_info": EggInfo, "build_py": BuildPy, "sdist": Sdist})
+class WithPrograms(Distribution):
+    def has_ext_modules(self):
+        return True
+
+
+# First of all: setuptools wants to see every package, and a fresh clone has no stubs yet.
+generate_stubs()
+arguments = {"packages": ["touchstone", "touchstone.v1"], "install_requires": dependencies(), "entry_points": {},
+             "cmdclass": {"build_py": BuildPy}}
+if PROGRAMS:
+    names = sorted(path.name for path in (pathlib.Path(PROGRAMS) / "bin").iterdir())
+    arguments["packages"] += ["touchstone_sim"]
+    arguments["entry_points"] = {"console_scripts": [f"{name} = touchstone_sim:{name.replace('-', '_')}" for name in names]}
+    arguments["cmdclass"]["bdist_wheel"] = WheelOfPrograms
+    arguments["distclass"] = WithPrograms
+setup(**arguments)

@@ -3,7 +3,7 @@
     touchstone session export session.db -o session.h5
     python -m touchstone.mcap session.h5 -o session.mcap
 
-Needs the extra `touchstone[mcap]` (mcap, h5py). The HDF5 file is what a session is exported to: every row of the
+Needs the extra `touchstone-sim[mcap]` (mcap, h5py). The HDF5 file is what a session is exported to: every row of the
 journal was checked on its way there.
 
 Channels, each with its schema in the file, times in Unix nanoseconds:

@@ -32,16 +32,18 @@ wait "$server"
 
 
 def find_server() -> str:
-    """The program: TOUCHSTONE_SERVER, else from PATH, else of the build beside this source tree."""
+    """The program: TOUCHSTONE_SERVER, else that of this wheel, else from PATH, else of the build beside this source tree."""
     named = os.environ.get("TOUCHSTONE_SERVER")
     if named:
         if os.access(named, os.X_OK):
             return named
         raise SourceUnreachable(f"TOUCHSTONE_SERVER is {named!r}, which is no program that can be run.")
-    built = pathlib.Path(__file__).resolve().parents[3] / "build/release/bin/touchstone-server"
-    found = shutil.which("touchstone-server") or (str(built) if os.access(built, os.X_OK) else None)
-    if found:
-        return found
+    here = pathlib.Path(__file__).resolve()
+    bundled = str(here.parents[1] / "touchstone_sim/bin/touchstone-server")
+    built = str(here.parents[3] / "build/release/bin/touchstone-server")
+    for found in (bundled, shutil.which("touchstone-server"), built):
+        if found and os.access(found, os.X_OK):
+            return found
     raise SourceUnreachable(
         "connect() without an address starts a touchstone-server of its own, and there is none in PATH. Put it there, "
         'name it in TOUCHSTONE_SERVER, or give the address of one that runs: connect("HOST:PORT").'

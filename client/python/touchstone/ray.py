@@ -7,7 +7,7 @@
     samples = touchstone.connect("server:50051").samples(["lat00", "lat20"], samples=1_000_000, seed=1)
     dataset = ray.data.read_datasource(TouchstoneDatasource(samples))
 
-Imported on its own, since Ray is optional: pip install touchstone[ray].
+Imported on its own, since Ray is optional: pip install touchstone-sim[ray].
 """
 
 from __future__ import annotations
