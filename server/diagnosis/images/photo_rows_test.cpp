@@ -37,10 +37,10 @@ TEST_F(PhotoRowsTest, SimulateOnlyPhotographsWithARowThatIsRead) {
   const std::vector<double> some = *rows->PredictOthers(model, Unread());
   // What was not simulated is not taken for known later.
   const std::vector<double> all = *rows->Predict(model);
-  const model::Model other = WithPhotoEffects(anchor, {{"gamma", {"exponent=1.1"}}});
-  const std::vector<double> near = *rows->PredictNear(other, anchor, *rows->Predict(anchor)),
-                            some_near =
-                                *rows->PredictOthersNear(other, anchor, *rows->Predict(anchor), Unread());
+  const model::Model at = WithPhotoEffects(anchor, {{"gamma", {"exponent=1"}}}),
+                     moved = WithPhotoEffects(anchor, {{"gamma", {"exponent=1.1"}}});
+  const std::vector<double> there = *rows->Predict(at), near = *rows->PredictNear(moved, at, there),
+                            some_near = *rows->PredictOthersNear(moved, at, there, Unread());
   for (int row = 0; row < rows->rows(); ++row) {
     const bool read = rows->PhotographOfRow(row) % 2 == 0;
     EXPECT_EQ(some[row], read ? all[row] : 0) << row;
