@@ -48,12 +48,22 @@ absl::Status DifferentiateShape(const Experiment& experiment, const Parameteriza
   return absl::OkStatus();
 }
 
+// Of the parabola through no step and two steps, one twice as long as the other, that gain so much: whether it promises
+// nothing between. A loss that does not grow like a parabola promises anything.
+bool PromisesNothing(double gain, double gain_of_half) {
+  const double slope = 4 * gain_of_half - gain, curvature = gain - slope;
+  return curvature < 0 && (slope <= 0 || slope * slope < -4 * curvature * kConverged);
+}
+
 // One fit under way: where it stands, and what the columns there say.
 class GaussNewton {
  public:
   GaussNewton(const Experiment& experiment, const Parameterization& model, Fit* fit)
       : experiment_(experiment), model_(model), fit_(fit), members_(model.size() + 1) {
     std::iota(members_.begin(), members_.end(), 0);
+    for (const FreeParameter& parameter : model_.parameters())
+      has_rough_derivatives_ |=
+          experiment_.observations->HasRoughDerivatives(*model_.base().effects[parameter.effect].effect);
   }
 
   absl::Status Begin() {
@@ -93,8 +103,13 @@ class GaussNewton {
                                   experiment_.observations->Predict(model_.At(point)));
       const Likelihood::Columns r =
           experiment_.likelihood->Prepare(experiment_.observations->Residual(predicted));
+      const double longer_gain = step.gain;
       step.gain = LogPosterior(r, s, point) - here;
-      if (step.gain <= 0) continue;
+      if (step.gain <= 0) {
+        // Rough derivatives may lead where nothing grows, however short the step.
+        if (has_rough_derivatives_ && halving > 0 && PromisesNothing(longer_gain, step.gain)) break;
+        continue;
+      }
       step.moved = true;
       fit_->point = point;
       fit_->predicted = std::move(predicted);
@@ -127,6 +142,7 @@ class GaussNewton {
   const Parameterization& model_;
   Fit* fit_;
   std::vector<int> members_;
+  bool has_rough_derivatives_ = false;
 };
 
 }  // namespace

@@ -190,6 +190,63 @@ TEST_F(FitTest, RefitsWithoutAStretchOfTimeSeeNothingOfItsTouches) {
   }
 }
 
+// Derivatives that are wrong by their sign, and a count of simulations.
+class WrongDerivatives : public LinearTestModel {
+ public:
+  using LinearTestModel::LinearTestModel;
+  absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
+    ++predictions;
+    return LinearTestModel::Predict(model);
+  }
+  absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model&,
+                                                  const std::vector<double>& predicted) const override {
+    std::vector<double> near = *LinearTestModel::Predict(moved);
+    for (size_t r = 0; r < near.size(); ++r) near[r] = 2 * predicted[r] - near[r];
+    return near;
+  }
+  bool HasRoughDerivatives(const model::Effect&) const override { return rough; }
+  bool rough = false;
+  mutable int predictions = 0;
+};
+
+TEST_F(FitTest, DoesNotHalveAStepOnAlongRoughDerivativesThatLeadUphill) {
+  WrongDerivatives wrong(4, 25, 2);
+  wrong.columns = rows.columns;
+  wrong.measured = rows.measured + 3e-5 * rows.columns["tool_tilt"];
+  experiment.observations = &wrong;
+  const Fit halved = *FitModel(experiment, Free({"tool_tilt"}));
+  EXPECT_EQ(wrong.predictions, 1 + 6);  // where it starts, a step and five halvings
+  wrong.rough = true, wrong.predictions = 0;
+  const Fit ended = *FitModel(experiment, Free({"tool_tilt"}));
+  EXPECT_EQ(wrong.predictions, 1 + 2);
+  EXPECT_EQ(ended.point, halved.point);
+}
+
+// Reads nothing of the rows that are left out.
+class LeavesUnreadOut : public LinearTestModel {
+ public:
+  using LinearTestModel::LinearTestModel;
+  absl::StatusOr<std::vector<double>> PredictOthers(const model::Model& model,
+                                                    const std::vector<int>& unread) const override {
+    std::vector<double> predicted = *LinearTestModel::Predict(model);
+    for (const int row : unread) predicted[row] = 1e6;
+    return predicted;
+  }
+};
+
+TEST_F(FitTest, HeldOutErrorsDoNotDependOnWhatAFitPredictsOfRowsThatItDoesNotRead) {
+  rows.measured += kPushM * rows.columns["object_push"];
+  const Fit fit = *FitModel(experiment, Free({"object_push"}));
+  const double unseen = *HeldOutRmseRefitted(experiment, fit);
+  const std::vector<double> squares = *HeldOutSquaresRefitted(experiment, fit);
+  LeavesUnreadOut other(4, 25, 2);
+  other.columns = rows.columns;
+  other.measured = rows.measured;
+  experiment.observations = &other;
+  EXPECT_EQ(*HeldOutRmseRefitted(experiment, fit), unseen);
+  EXPECT_EQ(*HeldOutSquaresRefitted(experiment, fit), squares);
+}
+
 TEST_F(FitTest, RefittedHeldOutErrorEndsWhenItIsCancelled) {
   const Fit fit = *FitModel(experiment, Free({"object_push"}));
   experiment.cancelled = [] { return true; };

@@ -74,11 +74,11 @@ class WithoutRows : public ObservationModel {
   int BlockOfRow(int row) const override { return all_.BlockOfRow(row); }
   double TimeOfRow(int row) const override { return all_.TimeOfRow(row); }
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override {
-    return all_.Predict(model);
+    return all_.PredictOthers(model, left_out_);
   }
   absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model& at,
                                                   const std::vector<double>& predicted) const override {
-    return all_.PredictNear(moved, at, predicted);
+    return all_.PredictOthersNear(moved, at, predicted, left_out_);
   }
   double DerivativeStep() const override { return all_.DerivativeStep(); }
   bool HasRoughDerivatives(const model::Effect& effect) const override {
@@ -195,10 +195,12 @@ std::vector<double> LinearHeldOut(const Experiment& experiment, const Folds& fol
 }
 
 // The sum of squares of the rows that a fit did not see.
-double UnseenSquares(const ObservationModel& observations, const RefitWithoutPart& refit) {
+absl::StatusOr<double> UnseenSquares(const ObservationModel& observations, const RefitWithoutPart& refit) {
   const std::optional<double> own = observations.SquaresOfUnseen(refit.fit.model.base(), refit.rows);
   if (own.has_value()) return *own;
-  const Eigen::VectorXd residual = observations.Residual(refit.fit.predicted);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted,
+                              observations.Predict(refit.fit.model.base()));
+  const Eigen::VectorXd residual = observations.Residual(predicted);
   double sum = 0;
   for (const int row : refit.rows) sum += residual[row] * residual[row];
   return sum;
@@ -226,8 +228,10 @@ absl::StatusOr<std::vector<double>> HeldOutSquaresRefitted(const Experiment& exp
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<RefitWithoutPart> refits,
                               Refit(experiment, fit, GroupOrBlockFolds(*experiment.observations, fit.model)));
   std::vector<double> squares;
-  for (const RefitWithoutPart& refit : refits)
-    squares.push_back(UnseenSquares(*experiment.observations, refit));
+  for (const RefitWithoutPart& refit : refits) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double unseen, UnseenSquares(*experiment.observations, refit));
+    squares.push_back(unseen);
+  }
   return squares;
 }
 
@@ -275,7 +279,10 @@ absl::StatusOr<double> HeldOutRmseRefitted(const Experiment& experiment, const F
   double largest = 0;
   for (const std::vector<RefitWithoutPart>& refits : divisions) {
     double sum = 0;
-    for (const RefitWithoutPart& refit : refits) sum += UnseenSquares(observations, refit);
+    for (const RefitWithoutPart& refit : refits) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double unseen, UnseenSquares(observations, refit));
+      sum += unseen;
+    }
     largest = std::max(largest, sum);
   }
   return std::sqrt(largest / n);

@@ -29,7 +29,7 @@ struct HeldOutFall {
 HeldOutFall FallOfHeldOut(const std::vector<double>& before, const std::vector<double>& after,
                           double negligible);
 
-// A fit that did not see these rows.
+// A fit that did not see these rows; what it `predicted` of them means nothing.
 struct RefitWithoutPart {
   std::vector<int> rows;
   Fit fit;

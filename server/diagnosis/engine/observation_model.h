@@ -52,6 +52,18 @@ class ObservationModel {
                                                           const std::vector<double>&) const {
     return Predict(moved);
   }
+  // The same for fits that read all rows but these, whose predictions may be anything finite: what is expensive to simulate
+  // leaves them out.
+  virtual absl::StatusOr<std::vector<double>> PredictOthers(const model::Model& model,
+                                                            const std::vector<int>& /*unread*/) const {
+    return Predict(model);
+  }
+  virtual absl::StatusOr<std::vector<double>> PredictOthersNear(const model::Model& moved,
+                                                                const model::Model& at,
+                                                                const std::vector<double>& predicted,
+                                                                const std::vector<int>& /*unread*/) const {
+    return PredictNear(moved, at, predicted);
+  }
   // The sum of squares of rows under values that were found without them, where it is not that of these rows' residuals:
   // a block with values of its own that every prediction fits to it (the pose of a picture) is no judge of the shared
   // ones unless those are fitted to another part of it. Rows of whole blocks.

@@ -67,13 +67,18 @@ Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey
 }
 
 Eigen::VectorXf CellSums(const CellGrid& grid, const float* image) {
-  Eigen::VectorXf sums = Eigen::VectorXf::Zero(grid.size());
-  for (int y = 0; y < grid.height; ++y) {
-    float* row = &sums[y / grid.cell * grid.columns()];
-    const float* from = image + static_cast<size_t>(y) * grid.width;
+  Eigen::VectorXf sums(grid.size());
+  Eigen::VectorXf down(grid.width);
+  for (int row = 0; row < grid.rows(); ++row) {
+    // Down the columns of pixels first: many at a time.
+    down.setZero();
+    for (int y = row * grid.cell; y < std::min((row + 1) * grid.cell, grid.height); ++y)
+      down += Eigen::Map<const Eigen::VectorXf>(image + static_cast<size_t>(y) * grid.width, grid.width);
     for (int column = 0; column < grid.columns(); ++column) {
       const int end = std::min((column + 1) * grid.cell, grid.width);
-      for (int x = column * grid.cell; x < end; ++x) row[column] += from[x];
+      float sum = 0;
+      for (int x = column * grid.cell; x < end; ++x) sum += down[x];
+      sums[row * grid.columns() + column] = sum;
     }
   }
   return sums;

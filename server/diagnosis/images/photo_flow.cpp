@@ -10,31 +10,41 @@ constexpr int kAroundPx = 6;  // beyond the object's outline, that blurred conto
 
 // Pixels without a displacement take the mean of their neighbours that have one.
 void Spread(int width, int height, std::vector<uint8_t>* known, std::vector<Eigen::Vector2f>* move_px) {
-  std::vector<int> border;
+  const auto for_neighbours = [&](int at, const auto& visit) {
+    const int x = at % width;
+    if (x > 0) visit(at - 1);
+    if (x + 1 < width) visit(at + 1);
+    if (at >= width) visit(at - width);
+    if (at + width < width * height) visit(at + width);
+  };
+  std::vector<int> latest, border;  // known since the last pass; unknown beside those
+  for (int at = 0; at < width * height; ++at)
+    if ((*known)[at]) latest.push_back(at);
   std::vector<Eigen::Vector2f> means;
+  std::vector<uint8_t> reached = *known;
   for (int pass = 0; pass < kAroundPx; ++pass) {
     border.clear(), means.clear();
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x) {
-        const int at = y * width + x;
-        if ((*known)[at]) continue;
-        Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-        int count = 0;
-        const auto add = [&](bool inside, int other) {
-          if (!inside || !(*known)[other]) return;
-          sum += (*move_px)[other];
-          ++count;
-        };
-        add(x > 0, at - 1), add(x + 1 < width, at + 1), add(y > 0, at - width),
-            add(y + 1 < height, at + width);
-        if (count == 0) continue;
+    for (const int from : latest)
+      for_neighbours(from, [&](int at) {
+        if (reached[at]) return;
+        reached[at] = 1;
         border.push_back(at);
-        means.push_back(sum / static_cast<float>(count));
-      }
+      });
+    for (const int at : border) {
+      Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+      int count = 0;
+      for_neighbours(at, [&](int other) {
+        if (!(*known)[other]) return;
+        sum += (*move_px)[other];
+        ++count;
+      });
+      means.push_back(sum / static_cast<float>(count));
+    }
     for (size_t i = 0; i < border.size(); ++i) {
       (*known)[border[i]] = 1;
       (*move_px)[border[i]] = means[i];
     }
+    latest = border;
   }
 }
 

@@ -132,10 +132,15 @@ class LargeSteps {
   PhotoSelection& selection_;
 };
 
-// The fits on the way to the whole explanation with their errors, which is its polished fit.
-absl::StatusOr<std::vector<PhotoRung>> RungsOf(const Photographs& photographs,
-                                               const DiagnosisContext& context,
-                                               const PhotoSelection& selection) {
+// The fits on the way to the whole explanation, which is its polished fit, with their errors: up to the first without gain,
+// whose effect is `idle` (-1: every step has one). What lies beyond is not fitted without its parts, which takes longest.
+struct Rungs {
+  std::vector<PhotoRung> rungs;
+  int idle = -1;
+};
+
+absl::StatusOr<Rungs> RungsOf(const Photographs& photographs, const DiagnosisContext& context,
+                              const PhotoSelection& selection) {
   const engine::Experiment& experiment = *selection.fine.experiment;
   std::vector<engine::SelectedStep> steps;
   for (int e = selection.initial_effects; e < static_cast<int>(selection.fit.model.base().effects.size());
@@ -144,20 +149,33 @@ absl::StatusOr<std::vector<PhotoRung>> RungsOf(const Photographs& photographs,
   TOUCHSTONE_ASSIGN_OR_RETURN(
       std::vector<engine::OrderedStep> ordered,
       engine::OrderSteps(experiment, {selection.fit, selection.initial_effects}, selection.field, steps));
-  std::vector<PhotoRung> rungs;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double given,
+                              ErrorOf(photographs, selection.initial.model.base(), context.pool));
+  Rungs made;
+  std::vector<engine::Quality> after;
   for (engine::OrderedStep& step : ordered) {
+    const engine::Fit alone = step.fit;
     PhotoRung rung{step.step->effect, std::move(step.fit)};
-    TOUCHSTONE_ASSIGN_OR_RETURN(rung.heldout_ratio,
-                                HeldOutRatio(photographs, *selection.fine.rows, experiment, rung.fit));
-    if (rungs.size() + 1 == ordered.size()) {
+    if (made.rungs.size() + 1 == ordered.size()) {
       // What is saved: the values of the whole explanation, without what has no name.
       rung.fit = selection.polished;
       if (selection.field >= 0) rung.fit.model = rung.fit.model.Without(selection.field);
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(rung.rmse, ErrorOf(photographs, rung.fit.model.base(), context.pool));
-    rungs.push_back(std::move(rung));
+    const auto is_idle = [&](double heldout_rmse) {
+      after.back().heldout_rmse = heldout_rmse;
+      return engine::StepWithoutGain({given, given, 0}, after) >= 0;
+    };
+    made.idle = rung.effect;
+    after.push_back({rung.rmse, 0, 0});
+    if (is_idle(0)) return made;  // whatever unseen pictures say
+    TOUCHSTONE_ASSIGN_OR_RETURN(rung.heldout_ratio,
+                                HeldOutRatio(photographs, *selection.fine.rows, experiment, alone));
+    if (is_idle(rung.rmse * rung.heldout_ratio)) return made;
+    made.rungs.push_back(std::move(rung));
+    made.idle = -1;
   }
-  return rungs;
+  return made;
 }
 
 }  // namespace
@@ -196,15 +214,10 @@ absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisCo
                                PhotoSelection* selection) {
   for (;;) {
     TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
-    TOUCHSTONE_ASSIGN_OR_RETURN(selection->rungs, RungsOf(photographs, context, *selection));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const double given,
-                                ErrorOf(photographs, selection->initial.model.base(), context.pool));
-    std::vector<engine::Quality> after;
-    for (const PhotoRung& rung : selection->rungs)
-      after.push_back({rung.rmse, rung.rmse * rung.heldout_ratio, 0});
-    const int idle = engine::StepWithoutGain({given, given, 0}, after);
-    if (idle < 0) return absl::OkStatus();
-    const int effect = selection->rungs[idle].effect;
+    TOUCHSTONE_ASSIGN_OR_RETURN(Rungs made, RungsOf(photographs, context, *selection));
+    selection->rungs = std::move(made.rungs);
+    if (made.idle < 0) return absl::OkStatus();
+    const int effect = made.idle;
     TOUCHSTONE_ASSIGN_OR_RETURN(
         selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(effect)));
     if (selection->field > effect) --selection->field;

@@ -86,7 +86,7 @@ void PhotoRows::Number(const std::vector<Direction>& directions) {
   first_row_.assign(1, 0);
   first_row_of_group_.assign(objects + 1, 0);
   for (size_t v = 0; v < views_.size(); ++v) {
-    const int rows = static_cast<int>(views_[v]->basis.cols());
+    const int rows = static_cast<int>(views_[v]->basis.rows());
     photograph_of_row_.insert(photograph_of_row_.end(), rows, views_[v]->k);
     first_row_.push_back(first_row_.back() + rows);
     first_row_of_group_[photographs_.object[views_[v]->k] + 1] = first_row_.back();
@@ -118,11 +118,16 @@ void PhotoRows::Number(const std::vector<Direction>& directions) {
     albedo_.size_m += (surface->bounds().max_m - surface->bounds().min_m).maxCoeff() / objects;
 }
 
-std::vector<double> PhotoRows::Predict(const model::Model& model, ThreadPool* pool) const {
+std::vector<double> PhotoRows::Predict(const model::Model& model, const std::vector<int>& unread,
+                                       ThreadPool* pool) const {
   std::vector<double> predicted(rows());
   std::vector<std::shared_ptr<const std::vector<double>>> parts(photographs_.objects.size());
   std::vector<std::string> keys;
   std::vector<int> missing;  // views
+  std::vector<int> unread_of(views_.size(), 0);
+  for (const int row : unread)
+    ++unread_of[std::upper_bound(first_row_.begin(), first_row_.end(), row) - first_row_.begin() - 1];
+  std::vector<bool> whole(parts.size(), true);  // whether all of an object is read
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (size_t object = 0; object < parts.size(); ++object) {
@@ -130,8 +135,13 @@ std::vector<double> PhotoRows::Predict(const model::Model& model, ThreadPool* po
       if (const auto found = known_.find(keys[object]); found != known_.end()) parts[object] = found->second;
     }
   }
-  for (size_t v = 0; v < views_.size(); ++v)
-    if (parts[photographs_.object[views_[v]->k]] == nullptr) missing.push_back(static_cast<int>(v));
+  for (size_t v = 0; v < views_.size(); ++v) {
+    const int object = photographs_.object[views_[v]->k];
+    if (parts[object] != nullptr) continue;
+    const bool skipped = unread_of[v] > 0 && unread_of[v] == first_row_[v + 1] - first_row_[v];
+    if (!skipped) missing.push_back(static_cast<int>(v));
+    whole[object] = whole[object] && !skipped;
+  }
   const image::PhotoSimulator simulator(std::make_shared<const model::Model>(model));
   ParallelFor(pool, static_cast<int>(missing.size()), 1, [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
@@ -146,6 +156,7 @@ std::vector<double> PhotoRows::Predict(const model::Model& model, ThreadPool* po
       std::copy(parts[object]->begin(), parts[object]->end(), predicted.begin() + begin);
       continue;
     }
+    if (!whole[object]) continue;
     const std::lock_guard<std::mutex> lock(mutex_);
     known_[keys[object]] =
         std::make_shared<const std::vector<double>>(predicted.begin() + begin, predicted.begin() + end);
@@ -162,18 +173,31 @@ std::vector<double> PhotoRows::Predict(const model::Model& model, ThreadPool* po
 
 Eigen::VectorXd PhotoRows::Expect(const image::PhotoSimulator& simulator, const View& view) const {
   const std::lock_guard<std::mutex> lock(view.mutex);
-  const absl::StatusOr<image::Photo> photo =
+  absl::StatusOr<image::Photo> photo =
       simulator.Run(photographs_.requests[view.k], image::PhotoOutputs(), &view.workspace);
   if (!photo.ok()) return view.measured.array() + kFarRows;
-  return view.Project(grid_, RecordedGrey(*photo, *photographs_.record));
+  photographs_.record->ToMeans(&photo->grey);
+  return view.Project(grid_, photo->grey);
 }
 
 absl::StatusOr<std::vector<double>> PhotoRows::Predict(const model::Model& model) const {
-  return Predict(model, pool_);
+  return Predict(model, {}, pool_);
+}
+
+absl::StatusOr<std::vector<double>> PhotoRows::PredictOthers(const model::Model& model,
+                                                             const std::vector<int>& unread) const {
+  return Predict(model, unread, pool_);
 }
 
 absl::StatusOr<std::vector<double>> PhotoRows::PredictNear(const model::Model& moved, const model::Model& at,
                                                            const std::vector<double>& predicted) const {
+  return PredictOthersNear(moved, at, predicted, {});
+}
+
+absl::StatusOr<std::vector<double>> PhotoRows::PredictOthersNear(const model::Model& moved,
+                                                                 const model::Model& at,
+                                                                 const std::vector<double>& predicted,
+                                                                 const std::vector<int>& unread) const {
   std::vector<double> near = predicted;
   for (size_t e = 0; e < moved.effects.size(); ++e) {
     const model::Effect& effect = *moved.effects[e].effect;
@@ -191,7 +215,7 @@ absl::StatusOr<std::vector<double>> PhotoRows::PredictNear(const model::Model& m
           continue;
         }
         const auto slope = slope_of_.find({effect.name, static_cast<int>(value)});
-        if (slope == slope_of_.end()) return Predict(moved, nullptr);
+        if (slope == slope_of_.end()) return Predict(moved, unread, nullptr);
         rows += step * views_[v]->slopes.col(slope->second);
       }
     }

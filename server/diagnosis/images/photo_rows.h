@@ -53,6 +53,11 @@ class PhotoRows : public engine::ObservationModel {
   absl::StatusOr<std::vector<double>> Predict(const model::Model& model) const override;
   absl::StatusOr<std::vector<double>> PredictNear(const model::Model& moved, const model::Model& at,
                                                   const std::vector<double>& predicted) const override;
+  absl::StatusOr<std::vector<double>> PredictOthers(const model::Model& model,
+                                                    const std::vector<int>& unread) const override;
+  absl::StatusOr<std::vector<double>> PredictOthersNear(const model::Model& moved, const model::Model& at,
+                                                        const std::vector<double>& predicted,
+                                                        const std::vector<int>& unread) const override;
   Eigen::VectorXd Residual(const std::vector<double>& predicted) const override;
   Eigen::VectorXd Change(const std::vector<double>& predicted,
                          const std::vector<double>& moved) const override;
@@ -77,7 +82,9 @@ class PhotoRows : public engine::ObservationModel {
   void Number(const std::vector<Direction>& directions);
   // Rows of one view, without the image field.
   Eigen::VectorXd Expect(const image::PhotoSimulator& simulator, const View& view) const;
-  std::vector<double> Predict(const model::Model& model, ThreadPool* pool) const;
+  // Of photographs without any row that is read, zeros.
+  std::vector<double> Predict(const model::Model& model, const std::vector<int>& unread,
+                              ThreadPool* pool) const;
 
   const Photographs& photographs_;
   ThreadPool* pool_;

@@ -16,6 +16,7 @@ constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typic
 constexpr double kStepPx = 0.5;  // that a step moves contours, at most: they stay among pixels near contours
 constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
 constexpr int kObjectWaves = 2, kPatchPx = 12;
+constexpr int kMaxRun = 64;         // of cells that are summed in single precision
 constexpr double kMinPatch = 0.25;  // of a patch's pixels that see the object
 
 // Moves one flat value, of every object.
@@ -39,10 +40,30 @@ const model::ParameterInfo& ParameterOf(const model::Effect& effect, int fingers
 
 }  // namespace
 
-std::vector<float> RecordedGrey(const image::Photo& photo, const RecordTable& record) {
-  std::vector<float> grey = photo.grey;
-  record.ToMeans(&grey);
-  return grey;
+void PhotoRows::View::SetAnchor(const CellGrid& grid, const std::vector<float>& grey) {
+  cells_at_anchor = CellSums(grid, grey.data());
+  rows_at_anchor = (basis * cells_at_anchor.cwiseProduct(weights)).cast<double>();
+}
+
+Eigen::VectorXd PhotoRows::View::Project(const CellGrid& grid, const std::vector<float>& grey) const {
+  // From the anchor's picture, whose ground most models share.
+  const Eigen::VectorXf change = CellSums(grid, grey.data()) - cells_at_anchor;
+  Eigen::VectorXd rows = rows_at_anchor;
+  const int cells = grid.size();
+  for (int begin = 0; begin < cells;) {
+    if (change[begin] == 0) {
+      ++begin;
+      continue;
+    }
+    int end = begin + 1;
+    while (end < cells && end - begin < kMaxRun && change[end] != 0) ++end;
+    const int run = end - begin;
+    rows +=
+        (basis.middleCols(begin, run) * change.segment(begin, run).cwiseProduct(weights.segment(begin, run)))
+            .cast<double>();
+    begin = end;
+  }
+  return rows;
 }
 
 std::vector<PhotoRows::Direction> PhotoRows::DirectionsOf(
@@ -179,7 +200,7 @@ std::vector<engine::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const ima
   for (int top = 0; top < grid.rows(); top += side)
     for (int left = 0; left < grid.columns(); left += side) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      Eigen::VectorXf row = Eigen::VectorXf::Zero(basis.cols());
+      Eigen::VectorXf row = Eigen::VectorXf::Zero(basis.rows());
       int seen = 0;
       for (int cy = top; cy < std::min(top + side, grid.rows()); ++cy)
         for (int cx = left; cx < std::min(left + side, grid.columns()); ++cx) {
@@ -193,7 +214,7 @@ std::vector<engine::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const ima
               ++seen;
             }
           const int cell = cy * grid.columns() + cx;
-          if (light > 0) row += light * weights[cell] * basis.row(cell).transpose();
+          if (light > 0) row += light * weights[cell] * basis.col(cell);
         }
       if (seen < kMinPatch * side * side * grid.cell * grid.cell) continue;
       engine::SmoothErrorSite site;
@@ -218,7 +239,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         .Run(request, outputs, &workspace);
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
-  photo.grey = RecordedGrey(photo, *photographs_.record);
+  photographs_.record->ToMeans(&photo.grey);
   view->weights = CellWeights(grid_, photo.grey, *photographs_.record, options.contour_px2);
   const std::vector<float> contours = ContourSquares(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
@@ -244,8 +265,9 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
                     direction.upper);
         }
       }
-      if (const absl::StatusOr<image::Photo> there = simulate(moved, false); there.ok()) {
-        const std::vector<float> grey = RecordedGrey(*there, *photographs_.record);
+      if (absl::StatusOr<image::Photo> there = simulate(moved, false); there.ok()) {
+        photographs_.record->ToMeans(&there->grey);
+        const std::vector<float>& grey = there->grey;
         for (size_t i = 0; i < grey.size(); ++i) change[i] = grey[i] - photo.grey[i];
         if (!flow.move_px.empty()) {
           const std::vector<float> carried = CarriedBy(flow, photo, photo.grey);
@@ -261,13 +283,13 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   AddDisplacements(photo.grey, width, height, &columns);
   AddObjectLight(photo, &columns);
 
-  view->basis = OrthonormalSpan(columns.All(), kTolerance);
-  view->slopes.resize(view->basis.cols(), slopes.size());
+  view->basis = OrthonormalSpan(columns.All(), kTolerance).transpose();
+  view->SetAnchor(grid_, photo.grey);
+  view->slopes.resize(view->basis.rows(), slopes.size());
   for (size_t s = 0; s < slopes.size(); ++s)
-    view->slopes.col(static_cast<int>(s)) = (view->basis.transpose() * slopes[s]).cast<double>();
-  view->field.resize(view->basis.cols(), kImageFieldSize);
-  for (int f = 0; f < kImageFieldSize; ++f)
-    view->field.col(f) = (view->basis.transpose() * field[f]).cast<double>();
+    view->slopes.col(static_cast<int>(s)) = (view->basis * slopes[s]).cast<double>();
+  view->field.resize(view->basis.rows(), kImageFieldSize);
+  for (int f = 0; f < kImageFieldSize; ++f) view->field.col(f) = (view->basis * field[f]).cast<double>();
   view->measured = view->Project(grid_, photographs_.measured_grey[view->k]);
   view->sites = AlbedoSites(grid_, photo, view->weights, view->basis);
   return absl::OkStatus();

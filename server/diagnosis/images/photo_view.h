@@ -10,18 +10,21 @@ namespace touchstone::diagnosis::images {
 
 struct PhotoRows::View {
   int k = 0;
-  Eigen::VectorXf weights;   // of the cells
-  Eigen::MatrixXf basis;     // cells x rows
-  Eigen::VectorXd measured;  // rows
-  Eigen::MatrixXd slopes;    // rows x directions that move rays, per SI unit
-  Eigen::MatrixXd field;     // rows x functions of the image field
+  Eigen::VectorXf weights;          // of the cells
+  Eigen::MatrixXf basis;            // rows x cells
+  Eigen::VectorXf cells_at_anchor;  // sums of the anchor's picture
+  Eigen::VectorXd rows_at_anchor;   // of that picture
+  Eigen::VectorXd measured;         // rows
+  Eigen::MatrixXd slopes;           // rows x directions that move rays, per SI unit
+  Eigen::MatrixXd field;            // rows x functions of the image field
   std::vector<engine::SmoothErrorSite> sites;
   mutable std::mutex mutex;  // of the workspace
   mutable image::PhotoWorkspace workspace;
 
-  Eigen::VectorXd Project(const CellGrid& grid, const std::vector<float>& grey) const {
-    return (basis.transpose() * CellSums(grid, grey.data(), weights)).cast<double>();
-  }
+  // Sets what is known of the anchor's picture; `weights` and `basis` are set.
+  void SetAnchor(const CellGrid& grid, const std::vector<float>& grey);
+  // Rows of a picture as it is recorded on average. Cells that are as in the anchor's cost nothing.
+  Eigen::VectorXd Project(const CellGrid& grid, const std::vector<float>& grey) const;
 };
 
 // A way in which a picture may change.
@@ -34,8 +37,5 @@ struct PhotoRows::Direction {
   model::Model base;  // the anchor, with the effect where it lacks it
   model::Model moved;
 };
-
-// What is recorded on average where this photo is expected.
-std::vector<float> RecordedGrey(const image::Photo& photo, const RecordTable& record);
 
 }  // namespace touchstone::diagnosis::images

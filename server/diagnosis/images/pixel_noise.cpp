@@ -1,5 +1,7 @@
 #include "server/diagnosis/images/pixel_noise.h"
 
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +16,7 @@ constexpr int kPerGrey = 8;  // entries of a table
 constexpr int kEntries = 255 * kPerGrey + 1;
 constexpr double kRoundingVariance = 1.0 / 12;
 constexpr double kNoTail = 1e-12;
+constexpr size_t kBlock = 64;             // pixels that are looked at together
 constexpr double kKept = 0.8;             // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
 constexpr double kClipped = 4;            // standard deviations from black or white
@@ -112,13 +115,25 @@ void RecordTable::ToMeans(std::vector<float>* grey) const {
   // A diagnosis does this for every pixel that it expects, and most of them are grey levels that no clipping changes
   // (interpolating gives them back exactly), or a ground that is the same everywhere.
   float ground = std::numeric_limits<float>::quiet_NaN(), ground_mean = 0;
-  for (float& value : *grey) {
-    if (value >= first_kept_grey_ && value <= last_kept_grey_) continue;
-    if (value != ground) {
-      ground = value;
-      ground_mean = Mean(value);
+  const float first = first_kept_grey_, last = last_kept_grey_;
+  for (size_t begin = 0; begin < grey->size(); begin += kBlock) {
+    float* const values = grey->data() + begin;
+    const int count = static_cast<int>(std::min<size_t>(kBlock, grey->size() - begin));
+    const Eigen::Map<const Eigen::ArrayXf> block(values, count);
+    const float lowest = block.minCoeff(), highest = block.maxCoeff();
+    if (lowest >= first && highest <= last) continue;
+    if (lowest == highest) {
+      std::fill_n(values, count, Mean(lowest));
+      continue;
     }
-    value = ground_mean;
+    for (int i = 0; i < count; ++i) {
+      if (values[i] >= first && values[i] <= last) continue;
+      if (values[i] != ground) {
+        ground = values[i];
+        ground_mean = Mean(ground);
+      }
+      values[i] = ground_mean;
+    }
   }
 }
 
