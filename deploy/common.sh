@@ -50,6 +50,8 @@ install_python_package() {
   [[ -x $python ]] || /usr/bin/python3 -m venv --system-site-packages build/venv || return
   rm -rf build/wheel
   "$python" -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel client/python client/training || return
+  # The distribution's name of before 0.3; its files are those of the new one.
+  "$python" -m pip uninstall --quiet --yes touchstone 2>/dev/null || true
   "$python" -m pip install --quiet --no-deps --no-index --force-reinstall build/wheel/*.whl || return
   printf '%s' "$sources" > "$stamp"
 }

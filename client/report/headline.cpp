@@ -201,7 +201,7 @@ std::string Headline(const v1::Report& report) {
     case v1::Report::TOO_LITTLE_DATA:
       return TooLittle(report);
     default:
-      return IsOfPlan(report) ? report.summary() : Compared(report);
+      return IsOfPlan(report) ? FirstSentence(report) : Compared(report);
   }
 }
 

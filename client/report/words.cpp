@@ -218,8 +218,19 @@ std::string KindName(v1::DataReport::Kind kind) {
   return name;
 }
 
+namespace {
+
+// Whether the noise was given with a plan: no touch has shown it.
+bool IsNoiseOfPlan(const v1::DataReport& data) {
+  return data.kind() == v1::DataReport::TOUCHES && !(data.initial().rmse() > 0) &&
+         !data.noise().from_repeats() && data.noise().degrees_of_freedom() == 0 &&
+         !data.noise().is_rounding();
+}
+
+}  // namespace
+
 Floor NoiseFloorOf(const v1::DataReport& data) {
-  return {data.noise_floor(), data.has_noise() && !data.noise().from_repeats()};
+  return {data.noise_floor(), data.has_noise() && !data.noise().from_repeats() && !IsNoiseOfPlan(data)};
 }
 
 namespace {
@@ -246,6 +257,7 @@ std::string FloorWithLength(const v1::DataReport& data) {
 std::string NoiseFloorSentence(const v1::DataReport& data) {
   const Floor floor = NoiseFloorOf(data);
   if (!(floor.sigma > 0)) return "";
+  if (IsNoiseOfPlan(data)) return absl::StrCat(" Noise of one finger's time ", FloorWithLength(data), ".");
   const uint32_t repeats = data.set().repeats();
   return absl::StrCat(" Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data),
                       data.noise().is_rounding()
@@ -309,12 +321,18 @@ std::string ToDecide(const std::string& discriminating_measurement) {
 }
 
 std::string SummaryToShow(const v1::Report& report) {
-  if (IsOfPlan(report)) return "";  // the headline
+  // The first sentence is the headline.
+  if (IsOfPlan(report))
+    return report.summary().substr(std::min(FirstSentence(report).size() + 1, report.summary().size()));
   // Their own part says it at more length.
   if (!report.data_problems().empty()) return "";
   // Of boards it counts corners.
   const v1::DataReport& data = MainData(report);
   return data.initial().rmse() > 0 && data.kind() != v1::DataReport::BOARDS ? "" : report.summary();
+}
+
+std::string FirstSentence(const v1::Report& report) {
+  return report.summary().substr(0, report.summary().find(". ") + 1);
 }
 
 bool IsOfPlan(const v1::Report& report) {

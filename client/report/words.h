@@ -49,6 +49,8 @@ const v1::DataReport& DataOf(const v1::Report& report, const v1::DataProblem& pr
 bool IsJoint(const v1::Report& report);
 // Whether the report is of a plan (touchstone check): nothing was measured.
 bool IsOfPlan(const v1::Report& report);
+// Of the summary, with its full stop.
+std::string FirstSentence(const v1::Report& report);
 // "Touches", "Photographs": a heading where there are several.
 std::string KindName(v1::DataReport::Kind kind);
 

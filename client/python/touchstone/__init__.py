@@ -42,9 +42,10 @@ from .session import Session, touch_id
 from .version import __version__
 
 __all__ = [
-    "Batch", "Camera", "Client", "Credentials", "DataReport", "Dataset", "Description", "Effect", "EncodedImages", "FacesPlan", "Header",
-    "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model", "NotFound", "ObjectInfo", "Parameter",
-    "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Samples", "Session", "SourceChanged", "SourceFailed",
-    "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches", "TouchstoneError", "Value", "__version__",
-    "box_touches", "connect", "faces", "image", "read_plan", "sphere", "touch_id", "touches", "write_measurements",
+    "Batch", "Camera", "Client", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
+    "EncodedImages", "Explained", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
+    "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Samples",
+    "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches",
+    "TouchstoneError", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",
+    "sphere", "touch_id", "touches", "write_measurements",
 ]

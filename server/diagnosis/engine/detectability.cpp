@@ -19,8 +19,10 @@
 namespace touchstone::diagnosis::engine {
 namespace {
 
-constexpr int kMaxSteps = 8;            // towards a size
-constexpr double kNear = 0.02;          // of a size, where the steps end
+constexpr int kMaxSteps = 8;    // towards a size
+constexpr double kNear = 0.02;  // of a size, where the steps end
+constexpr double kMostOverTypical =
+    20;  // sizes over what rigs show: farther off, touches meet other faces, or nothing
 constexpr double kMaxGrowth = 30;       // of a size in one step
 constexpr int kMaxRivalSteps = 6;       // of Gauss and Newton, to a rival's best values
 constexpr double kRivalArrived = 0.05;  // standard errors
@@ -107,7 +109,7 @@ class Detector {
   // The farthest that the parameter goes from its neutral value, and the way there.
   static double Reach(const FreeParameter& p, double* sign) {
     *sign = p.upper - p.neutral >= p.neutral - p.lower ? 1 : -1;
-    return *sign > 0 ? p.upper - p.neutral : p.neutral - p.lower;
+    return std::min(*sign > 0 ? p.upper - p.neutral : p.neutral - p.lower, kMostOverTypical * p.scale);
   }
 
   // The extension's parameters with value i at a size; the others at their start, or (`together`) at their typical sizes.
@@ -250,7 +252,7 @@ class Detector {
   double ShareOf(const Eigen::VectorXd& response, int m) const {
     Eigen::MatrixXd columns(response.size(), own_ + spans_[m].count);
     columns << all_.values.leftCols(own_), all_.values.middleCols(own_ + spans_[m].first, spans_[m].count);
-    return ShareExplained(std::move(columns), response);
+    return ShareExplained(columns, response);
   }
 
   // The extension that comes nearest to a response in evidence; -1: none resembles it.

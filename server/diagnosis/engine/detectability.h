@@ -28,7 +28,8 @@ struct DetectableValue {
   double std_error = 0;
   double typical = 0;  // what rigs show, within the bounds
   double power_at_typical = 0;
-  std::optional<double> found_from;  // none: no size within the bounds, or the value does not act by itself
+  // None: no size within the bounds and twenty times what rigs show, or the value does not act by itself.
+  std::optional<double> found_from;
   // What would explain most of the effect at that size: an effect, "given:NAME", or empty. `correlation`: of the two
   // responses, 0 to 1.
   std::string rival;

@@ -87,6 +87,20 @@ TEST_F(DetectabilityTest, AnEffectThatMovesNoRowIsNotFound) {
   EXPECT_FALSE(push.found_from.has_value());
 }
 
+// A column of zeros made the correlation a NaN, and what moves no row the nearest rival.
+TEST_F(DetectabilityTest, WhatMovesNoRowIsNoRival) {
+  AddRival(0.5);
+  rows.columns["tip_radius"].setZero();
+  EXPECT_EQ(Detectable()[0].rival, "oblique_slip");
+}
+
+TEST_F(DetectabilityTest, NoSizeBeyondTwentyTimesWhatRigsShowIsNamed) {
+  rows.columns["object_push"] *= 1e-4;
+  const DetectableValue push = Detectable()[0];
+  EXPECT_GT(push.std_error, 0);
+  EXPECT_FALSE(push.found_from.has_value());
+}
+
 TEST_F(DetectabilityTest, ARivalTakesALargerSizeToBeToldFrom) {
   AddRival(0.98);
   const DetectableValue push = Detectable()[0];

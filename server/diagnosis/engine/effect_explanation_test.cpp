@@ -80,6 +80,14 @@ TEST_F(ExplainEffectTest, WhatMovesNoRowIsNotVisible) {
   EXPECT_EQ(sag.probability, 0);
 }
 
+// A column of zeros made the least squares a NaN, which sorted before every share.
+TEST_F(ExplainEffectTest, WhatMovesNoRowTakesNothingOver) {
+  for (const TakenOver& taken : Explain("object_push")->taken_over) {
+    EXPECT_NE(taken.effect, "gravity_sag");
+    EXPECT_TRUE(std::isfinite(taken.share)) << taken.effect;
+  }
+}
+
 TEST_F(ExplainEffectTest, AnEffectThatIsNoCandidateIsRefusedByName) {
   EXPECT_THAT(std::string(Explain("gaussian_noise").status().message()),
               testing::AllOf(testing::HasSubstr("'gaussian_noise' is no effect"),

@@ -10,9 +10,16 @@
 namespace touchstone::diagnosis::engine {
 
 // Share of a response's squares that columns explain by least squares, 0 to 1; no smooth error takes part. `response` must
-// not be 0.
-inline double ShareExplained(Eigen::MatrixXd columns, const Eigen::VectorXd& response) {
-  for (int c = 0; c < columns.cols(); ++c) columns.col(c) /= std::max(columns.col(c).norm(), 1e-300);
+// not be 0; columns may be.
+inline double ShareExplained(const Eigen::MatrixXd& given, const Eigen::VectorXd& response) {
+  Eigen::MatrixXd columns(given.rows(), 0);
+  for (int c = 0; c < given.cols(); ++c) {
+    const double norm = given.col(c).norm();
+    if (!(norm > 0)) continue;
+    columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
+    columns.rightCols(1) = given.col(c) / norm;
+  }
+  if (columns.cols() == 0) return 0;
   const Eigen::VectorXd left = response - columns * SolveLeastSquaresColumns(columns, response);
   return std::clamp(1 - left.squaredNorm() / response.squaredNorm(), 0.0, 1.0);
 }

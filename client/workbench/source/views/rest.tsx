@@ -54,6 +54,7 @@ export function Distributions() {
 function floorWords(data: DataReport, floor: number, bound: boolean): string {
   if (!(floor > 0)) return "";
   const noise = data.noise;
+  if (!bound && noise && !noise.from_repeats && !noise.is_rounding) return `${error(data.kind, floor)}, as it was given`;
   const sure = noise && noise.lower > 0 && noise.lower < noise.upper ? `, 95 % interval ${error(data.kind, noise.lower)} to ${error(data.kind, noise.upper)}` : "";
   return `${bound ? "at most " : ""}${error(data.kind, floor)}${sure}, from ${bound ? "the best model\u2019s residuals" : `repeats of the same ${isPictures(data.kind) ? "picture" : "touch"}`}${noise?.degrees_of_freedom ? `, ${count(noise.degrees_of_freedom)} degrees of freedom` : ""}`;
 }
