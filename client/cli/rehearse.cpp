@@ -285,7 +285,7 @@ void AddRehearse(Cli* cli) {
       "gives",
       [cli, options] { return RunRehearse(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
-  command->add_option("--minutes", options->minutes, "Ends after so long. Default: 10")->type_name("N");
+  command->add_option("--minutes", options->minutes, "Ends after so long. Default: 10")->type_name("MINUTES");
   command
       ->add_option("--sets", options->sets,
                    "Ends after so many sets, whatever the time. Default: by --minutes")
@@ -294,7 +294,7 @@ void AddRehearse(Cli* cli) {
       ->add_option(
           "--size", options->size,
           "Of a hidden effect, times what rigs usually show; found: where a check says 80 %. Default: 1")
-      ->type_name("N");
+      ->type_name("SIZE");
   command
       ->add_option("--effects", options->effects,
                    "Hide these only (and nothing, outside, mistake). Default: all")

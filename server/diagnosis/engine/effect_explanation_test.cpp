@@ -82,7 +82,8 @@ TEST_F(ExplainEffectTest, WhatMovesNoRowIsNotVisible) {
 
 // A column of zeros made the least squares a NaN, which sorted before every share.
 TEST_F(ExplainEffectTest, WhatMovesNoRowTakesNothingOver) {
-  for (const TakenOver& taken : Explain("object_push")->taken_over) {
+  const EffectExplanation push = *Explain("object_push");
+  for (const TakenOver& taken : push.taken_over) {
     EXPECT_NE(taken.effect, "gravity_sag");
     EXPECT_TRUE(std::isfinite(taken.share)) << taken.effect;
   }
