@@ -50,19 +50,23 @@ std::string Power(const v1::DetectableEffect& value) {
 void AddTable(const v1::Report& report, TextLayout* out) {
   const bool wide = out->width() >= kWideColumns;
   std::vector<std::vector<TextCell>> rows;
-  std::vector<TextCell> head = {{"effect"}, {"value"}, {"found from", true}};
+  std::vector<TextCell> head = {{"effect"}, {"found from", true}};
   if (wide) head.push_back({"rigs show", true});
   head.push_back({"power", true});
   head.push_back({"told apart from"});
   for (TextCell& cell : head) cell.style = TextLayout::kDim;
   rows.push_back(head);
+  std::map<std::string, int> values;
+  for (const v1::DetectableEffect& value : report.detectable()) ++values[value.effect()];
   std::string last;
   for (const v1::DetectableEffect& value : report.detectable()) {
-    const TextLayout::Style style = value.power_at_typical() < kPower ? TextLayout::kBad : TextLayout::kPlain;
-    std::vector<TextCell> row = {{value.effect() == last ? "" : value.effect()},
-                                 {ValueName(value)},
-                                 {value.has_found_from() ? Size(value.found_from(), value) : "-", true}};
+    // An effect of one value has one row, one of several a row for each.
+    const bool one = values[value.effect()] == 1;
+    if (!one && value.effect() != last) rows.push_back({{value.effect()}});
     last = value.effect();
+    const TextLayout::Style style = value.power_at_typical() < kPower ? TextLayout::kBad : TextLayout::kPlain;
+    std::vector<TextCell> row = {{one ? value.effect() : absl::StrCat("  ", ValueName(value))},
+                                 {value.has_found_from() ? Size(value.found_from(), value) : "-", true}};
     if (wide) row.push_back({Size(value.typical(), value), true});
     row.push_back({Power(value), true, style});
     row.push_back({ToldFrom(value)});
