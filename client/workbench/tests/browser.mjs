@@ -10,6 +10,7 @@ const shots = process.env.TOUCHSTONE_SHOTS;
 const axe = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
 const touches = sample("touches");
 const photographs = sample("photographs");
+const plan = sample("plan");
 let browser;
 
 before(async () => {
@@ -170,6 +171,18 @@ test("a phone shows all of it without scrolling sideways", async () => {
     await opened(data, async (page) => {
       assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
     }, { width: 390, height: 844, name });
+});
+
+test("the page of a plan says what it finds, with a bar for every value and no error", async () => {
+  await opened(plan, async (page) => {
+    assert.equal(await page.locator(".pill").innerText(), "plan");
+    assert.match(await page.locator("h1").innerText(), /this plan finds \d+ at the size/);
+    assert.equal(await page.locator("#power .sizes").count(), plan.report.detectable.length);
+    assert.match(await page.locator("#power").innerText(), /never: acts as clock_skew/);
+    assert.equal(await page.locator("#ladder, #where, #touches").count(), 0);
+    assert.match(await page.locator("#data").innerText(), /5\.00\sms, as it was given/);
+    assert.deepEqual(await violations(page), []);
+  }, { name: "plan" });
 });
 
 test("axe finds nothing, in light and in dark", async () => {
