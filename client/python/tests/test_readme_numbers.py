@@ -43,7 +43,7 @@ def test_the_error_falls_as_the_page_says(printed):
     before, ratio, after = said(rf"the error falls from {_NUMBER} ms, {_NUMBER} times the noise, to {_NUMBER} ms, the noise")
     _, outputs = printed
     compared = [re.search(rf"The model is off by {_NUMBER} ms, {_NUMBER} times the noise floor", text) for line, text in outputs.items()
-                if line.startswith("touchstone compare")]
+                if line.startswith("touchstone compare") and line.count("--model") == 1]
     (first, first_ratio), (last, last_ratio) = ([float(each) for each in match.groups()] for match in compared if match)
     assert (first, first_ratio, last) == (before, ratio, after) and last_ratio == pytest.approx(1, abs=0.05)
 
