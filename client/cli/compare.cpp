@@ -23,7 +23,7 @@ absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
 
 void AddCompare(Cli* cli) {
   auto options = std::make_shared<ComparisonOptions>();
-  options->most_models = 2;
+  options->max_models = 2;
   CLI::App* command = cli->AddCommand(
       nullptr, "compare",
       "Says how wrong a model is against measured touches or photographs, and where; of two models, which "

@@ -226,7 +226,7 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
       ->required(options->set_required);
   CLI::Option* model = add_input(
       "--model", options->models, "MODEL",
-      options->most_models > 1
+      options->max_models > 1
           ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
           : "Model file, name or hash. Default: the source's own");
   model->take_all()->expected(1);
@@ -263,9 +263,9 @@ absl::Status CheckNoMeshes(const Cli& cli, const std::vector<std::pair<std::stri
 
 absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
                                                              const ComparisonOptions& options) {
-  if (static_cast<int>(options.models.size()) > options.most_models)
+  if (static_cast<int>(options.models.size()) > options.max_models)
     return absl::InvalidArgumentError(absl::StrCat("--model: given ", options.models.size(), " times; ",
-                                                   options.most_models == 1 ? "once" : "once or twice",
+                                                   options.max_models == 1 ? "once" : "once or twice",
                                                    " was expected"));
   // Said before an hour of diagnosis, not after.
   if (const absl::Status page = workbench::PageTemplate().status(); !options.html.empty() && !page.ok())

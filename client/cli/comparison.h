@@ -24,8 +24,8 @@ inline constexpr char kPlanText[] =
 
 struct ComparisonOptions {
   std::string set;
-  std::vector<std::string> models;  // at most `most_models`
-  int most_models = 1;
+  std::vector<std::string> models;  // at most `max_models`
+  int max_models = 1;
   std::vector<std::string> also;
   uint64_t seed = 0;
   std::string html;

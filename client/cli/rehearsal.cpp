@@ -123,7 +123,7 @@ absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, 
   return cases;
 }
 
-RehearsedSet Judge(const RehearsedCase& hidden, const v1::Report& report) {
+RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
   RehearsedSet set;
   set.name = hidden.name;
   size_t found = 0;

@@ -50,7 +50,7 @@ struct RehearsedSet {
   std::vector<double> z;     // (estimate - truth) / standard error of hidden values that were fitted
   bool honest() const { return !false_claim && !confident; }
 };
-RehearsedSet Judge(const RehearsedCase& hidden, const v1::Report& report);
+RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report);
 
 Json ToJson(const RehearsedSet& set);
 // Error: what stands there is no set of a rehearsal.

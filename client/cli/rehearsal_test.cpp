@@ -74,39 +74,39 @@ TEST(ListCases, AnEffectThatTheCheckHasNotIsRefused) {
       HasSubstr("'tip_radios' is no effect"));
 }
 
-TEST(JudgeSet, TheHiddenEffectAloneIsRightAndItsValueIsCompared) {
-  const RehearsedSet set = Judge(Cases()[1], Naming("tip_radius", 1.6, 0.05, 0.99));
+TEST(AssessSet, TheHiddenEffectAloneIsRightAndItsValueIsCompared) {
+  const RehearsedSet set = Assess(Cases()[1], Naming("tip_radius", 1.6, 0.05, 0.99));
   EXPECT_TRUE(set.found && set.right && set.honest());
   EXPECT_THAT(set.z, ElementsAre(testing::DoubleNear(2, 1e-9)));
 }
 
-TEST(JudgeSet, AnotherEffectIsAFalseClaimAndWithConfidenceIsConfidentlyWrong) {
-  const RehearsedSet doubted = Judge(Cases()[1], Naming("gravity_sag", 0.5, 0.1, 0.6));
+TEST(AssessSet, AnotherEffectIsAFalseClaimAndWithConfidenceIsConfidentlyWrong) {
+  const RehearsedSet doubted = Assess(Cases()[1], Naming("gravity_sag", 0.5, 0.1, 0.6));
   EXPECT_TRUE(doubted.false_claim);
   EXPECT_FALSE(doubted.found || doubted.right || doubted.confident);
-  EXPECT_TRUE(Judge(Cases()[1], Naming("gravity_sag", 0.5, 0.1, 0.95)).confident);
+  EXPECT_TRUE(Assess(Cases()[1], Naming("gravity_sag", 0.5, 0.1, 0.95)).confident);
 }
 
-TEST(JudgeSet, AnEquivalentCountsAsFound) {
+TEST(AssessSet, AnEquivalentCountsAsFound) {
   v1::Report report = Naming("object_scale", 0.01, 0.001, 0.9);
   report.mutable_steps(0)->add_equivalent("tip_radius");
-  EXPECT_TRUE(Judge(Cases()[1], report).right);
+  EXPECT_TRUE(Assess(Cases()[1], report).right);
 }
 
-TEST(JudgeSet, OfNothingAnEmptyReportIsRight) {
+TEST(AssessSet, OfNothingAnEmptyReportIsRight) {
   v1::Report adequate;
   adequate.set_verdict(v1::Report::ADEQUATE);
-  EXPECT_TRUE(Judge(Cases()[0], adequate).right);
-  EXPECT_FALSE(Judge(Cases()[1], adequate).right);
-  EXPECT_TRUE(Judge(Cases()[1], adequate).honest());
-  EXPECT_FALSE(Judge(Cases()[0], Naming("tip_radius", 1, 0.1, 0.99)).right);
+  EXPECT_TRUE(Assess(Cases()[0], adequate).right);
+  EXPECT_FALSE(Assess(Cases()[1], adequate).right);
+  EXPECT_TRUE(Assess(Cases()[1], adequate).honest());
+  EXPECT_FALSE(Assess(Cases()[0], Naming("tip_radius", 1, 0.1, 0.99)).right);
 }
 
-TEST(JudgeSet, CheckDataIsRightForAMistakeAndConfidentlyWrongElse) {
+TEST(AssessSet, CheckDataIsRightForAMistakeAndConfidentlyWrongElse) {
   v1::Report checks;
   checks.set_verdict(v1::Report::CHECK_DATA);
-  EXPECT_TRUE(Judge(Cases()[4], checks).right);
-  EXPECT_TRUE(Judge(Cases()[1], checks).confident);
+  EXPECT_TRUE(Assess(Cases()[4], checks).right);
+  EXPECT_TRUE(Assess(Cases()[1], checks).confident);
 }
 
 TEST(RehearsalSummary, CountsWithIntervalsAndCoverage) {

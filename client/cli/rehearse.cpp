@@ -231,7 +231,7 @@ class Rehearsal {
                                   comparison_->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
                                     return comparison_->connection().diagnosis().Diagnose(context, request);
                                   }));
-      TOUCHSTONE_RETURN_IF_ERROR(state_.Add(Judge(hidden, report)));
+      TOUCHSTONE_RETURN_IF_ERROR(state_.Add(Assess(hidden, report)));
     }
     return absl::OkStatus();
   }

@@ -53,7 +53,7 @@ std::string NameInWords(const std::string& effect) {
   return absl::StrCat(name, name.size() < effect.size() ? " of the model" : "");
 }
 
-std::string Words(const report::Explained& explained, double rmse_us) {
+std::string Words(const report::ReportedExplanation& explained, double rmse_us) {
   const engine::EffectExplanation& found = explained.found;
   const std::string& name = found.effect;
   if (!found.visible)
@@ -131,7 +131,7 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
   if (!diagnosis.data[0].initial)
     return absl::InvalidArgumentError(
         absl::StrCat(input.set->origin, ": no touch can be compared with the model"));
-  report::Explained& explained = diagnosis.explained.emplace();
+  report::ReportedExplanation& explained = diagnosis.explained.emplace();
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.found, Find(effect, workspace.get()));
   if (explained.found.fit) {
     const engine::Fit& fit = *explained.found.fit;

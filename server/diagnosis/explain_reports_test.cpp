@@ -15,14 +15,14 @@ DiagnosisInput WithHiddenTip() {
   return touches::MakeTestInput(rig);
 }
 
-report::Diagnosis Explained(const std::string& effect) {
+report::Diagnosis ExplanationOf(const std::string& effect) {
   auto explained = Explain(WithHiddenTip(), effect, {});
   EXPECT_TRUE(explained.ok()) << explained.status();
   return *std::move(explained);
 }
 
 TEST(ExplainTouches, TheHiddenEffectLeavesTheNoise) {
-  const report::Diagnosis diagnosis = Explained("tip_radius");
+  const report::Diagnosis diagnosis = ExplanationOf("tip_radius");
   EXPECT_EQ(diagnosis.verdict, engine::Verdict::kNone);
   EXPECT_LT(diagnosis.explained->quality.rmse, 1.1 * diagnosis.data[0].noise_floor->sigma);
   EXPECT_GT(diagnosis.explained->found.probability, 0.99);
@@ -31,13 +31,13 @@ TEST(ExplainTouches, TheHiddenEffectLeavesTheNoise) {
 }
 
 TEST(ExplainTouches, AnotherEffectNamesTheOneThatExplainsThemBetter) {
-  const report::Diagnosis diagnosis = Explained("object_scale");
+  const report::Diagnosis diagnosis = ExplanationOf("object_scale");
   EXPECT_LT(diagnosis.explained->found.probability, 0.01);
   EXPECT_THAT(diagnosis.summary, HasSubstr("tip_radius alone gains"));
 }
 
 TEST(ExplainTouches, AnEffectThatTheTouchesDoNotAskForIsExcludedBeyondItsInterval) {
-  const report::Diagnosis diagnosis = Explained("return_hysteresis");
+  const report::Diagnosis diagnosis = ExplanationOf("return_hysteresis");
   EXPECT_THAT(diagnosis.summary,
               testing::AnyOf(HasSubstr("do not ask for it"), HasSubstr("changes nothing")));
 }

@@ -35,7 +35,7 @@ from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
-from .report import DataReport, Detectable, Explained, Quality, Report, Step, Value, Versus
+from .report import DataReport, Detectable, Explanation, Quality, Report, Step, Value, Versus
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id
@@ -43,7 +43,7 @@ from .version import __version__
 
 __all__ = [
     "Batch", "Camera", "Client", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
-    "EncodedImages", "Explained", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
+    "EncodedImages", "Explanation", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
     "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Samples",
     "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches",
     "TouchstoneError", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",

@@ -129,7 +129,7 @@ class Detectable:
 
 
 @dataclasses.dataclass(frozen=True)
-class Explained:
+class Explanation:
     """Why one effect is, or is not, what a model lacks.
 
     Attributes:
@@ -280,12 +280,12 @@ class Report:
         return tuple(map(_detectable, self.message.detectable))
 
     @property
-    def explained(self) -> Explained | None:
+    def explained(self) -> Explanation | None:
         """Of explain()."""
         if not self.message.HasField("explained"):
             return None
         e = self.message.explained
-        return Explained(e.words, e.effect, tuple(map(_value, e.parameters)), e.gain_nats, e.probability, e.rmse,
+        return Explanation(e.words, e.effect, tuple(map(_value, e.parameters)), e.gain_nats, e.probability, e.rmse,
                          e.heldout_rmse, {other.effect: other.share for other in e.taken_over}, e)
 
     @property

@@ -12,9 +12,9 @@
 namespace touchstone::diagnosis::engine {
 namespace {
 
-constexpr double kMostOverTypical = 20;  // sizes over what rigs show
-constexpr int kMaxRivalSteps = 6;        // of Gauss and Newton, to a rival's best values
-constexpr double kRivalArrived = 0.05;   // standard errors
+constexpr double kMaxOverTypical = 20;  // sizes over what rigs show
+constexpr int kMaxRivalSteps = 6;       // of Gauss and Newton, to a rival's best values
+constexpr double kRivalArrived = 0.05;  // standard errors
 constexpr double kCostOfParts =
     1.25;  // of a fitted value on rows of parts of a fifth, which it was not fitted to
 
@@ -66,7 +66,7 @@ double ExpectedEvidence::NoiseSquares(int s) const {
 
 double ExpectedEvidence::Reach(const FreeParameter& p, double* sign) {
   *sign = p.upper - p.neutral >= p.neutral - p.lower ? 1 : -1;
-  return std::min(*sign > 0 ? p.upper - p.neutral : p.neutral - p.lower, kMostOverTypical * p.scale);
+  return std::min(*sign > 0 ? p.upper - p.neutral : p.neutral - p.lower, kMaxOverTypical * p.scale);
 }
 
 Eigen::VectorXd ExpectedEvidence::PointAt(const Extension& extension, int i, double size,

@@ -232,6 +232,10 @@ class LeavesUnreadOut : public LinearTestModel {
     for (const int row : unread) predicted[row] = 1e6;
     return predicted;
   }
+  absl::StatusOr<std::vector<double>> CompletePrediction(const model::Model& model,
+                                                         const std::vector<double>&) const override {
+    return LinearTestModel::Predict(model);
+  }
 };
 
 TEST_F(FitTest, HeldOutErrorsDoNotDependOnWhatAFitPredictsOfRowsThatItDoesNotRead) {

@@ -199,7 +199,7 @@ absl::StatusOr<double> UnseenSquares(const ObservationModel& observations, const
   const std::optional<double> own = observations.SquaresOfUnseen(refit.fit.model.base(), refit.rows);
   if (own.has_value()) return *own;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted,
-                              observations.Predict(refit.fit.model.base()));
+                              observations.CompletePrediction(refit.fit.model.base(), refit.fit.predicted));
   const Eigen::VectorXd residual = observations.Residual(predicted);
   double sum = 0;
   for (const int row : refit.rows) sum += residual[row] * residual[row];

@@ -64,6 +64,11 @@ class ObservationModel {
                                                                 const std::vector<int>& /*unread*/) const {
     return PredictNear(moved, at, predicted);
   }
+  // That prediction with the rows that it left out; `predicted` itself where it leaves none out.
+  virtual absl::StatusOr<std::vector<double>> CompletePrediction(const model::Model& /*model*/,
+                                                                 const std::vector<double>& predicted) const {
+    return predicted;
+  }
   // The sum of squares of rows under values that were found without them, where it is not that of these rows' residuals:
   // a block with values of its own that every prediction fits to it (the pose of a picture) is no judge of the shared
   // ones unless those are fitted to another part of it. Rows of whole blocks.

@@ -58,6 +58,10 @@ class PhotoRows : public engine::ObservationModel {
   absl::StatusOr<std::vector<double>> PredictOthersNear(const model::Model& moved, const model::Model& at,
                                                         const std::vector<double>& predicted,
                                                         const std::vector<int>& unread) const override;
+  absl::StatusOr<std::vector<double>> CompletePrediction(const model::Model& model,
+                                                         const std::vector<double>&) const override {
+    return Predict(model);
+  }
   Eigen::VectorXd Residual(const std::vector<double>& predicted) const override;
   Eigen::VectorXd Change(const std::vector<double>& predicted,
                          const std::vector<double>& moved) const override;

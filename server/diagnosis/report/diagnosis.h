@@ -105,7 +105,7 @@ struct Versus {
 };
 
 // Why one effect is, or is not, what is missing; touches in seconds.
-struct Explained {
+struct ReportedExplanation {
   engine::EffectExplanation found;
   Quality quality;
   std::vector<residuals::DecidingTouch> speak_for, speak_against;
@@ -177,7 +177,7 @@ struct Diagnosis {
   std::vector<NextMeasurement> next;
   // What touches like these could have shown.
   std::vector<engine::DetectableValue> detectable;
-  std::optional<Explained> explained;
+  std::optional<ReportedExplanation> explained;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this

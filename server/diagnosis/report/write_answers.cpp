@@ -47,8 +47,8 @@ void WriteDetectable(const engine::DetectableValue& value, v1::DetectableEffect*
         value.effect->name, std::string(absl::StripPrefix(value.rival, engine::kGivenPrefix))));
 }
 
-void WriteExplained(const Explained& explained, const std::vector<std::string>& fingers,
-                    v1::ExplainedEffect* message) {
+void WriteExplanation(const ReportedExplanation& explained, const std::vector<std::string>& fingers,
+                      v1::ExplainedEffect* message) {
   message->set_effect(explained.found.effect);
   WriteParameters(explained.found.parameters, message->mutable_parameters());
   message->set_gain_nats(explained.found.gain_nats);

@@ -8,8 +8,8 @@ namespace touchstone::diagnosis::report {
 
 void WriteDetectable(const engine::DetectableValue& value, v1::DetectableEffect* message);
 // `fingers`: names, as DataReport has them.
-void WriteExplained(const Explained& explained, const std::vector<std::string>& fingers,
-                    v1::ExplainedEffect* message);
+void WriteExplanation(const ReportedExplanation& explained, const std::vector<std::string>& fingers,
+                      v1::ExplainedEffect* message);
 void WriteVersus(const Versus& versus, const std::vector<std::string>& fingers, v1::ModelComparison* message);
 
 }  // namespace touchstone::diagnosis::report

@@ -108,7 +108,7 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   for (const engine::DetectableValue& value : diagnosis.detectable)
     WriteDetectable(value, report.add_detectable());
   if (diagnosis.explained)
-    WriteExplained(*diagnosis.explained, diagnosis.data[0].fingers, report.mutable_explained());
+    WriteExplanation(*diagnosis.explained, diagnosis.data[0].fingers, report.mutable_explained());
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }
