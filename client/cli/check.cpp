@@ -1,6 +1,9 @@
 // touchstone check: what a plan can find, before any touch is made.
 #include <absl/strings/str_split.h>
 
+#include <cmath>
+#include <optional>
+
 #include "client/cli/comparison.h"
 #include "client/cli/proposed_touches.h"
 #include "client/cli/terminal.h"
@@ -11,12 +14,15 @@ namespace touchstone::cli {
 namespace {
 
 struct CheckOptions : ComparisonOptions {
-  double noise_us = 0;
+  std::optional<double> noise_us;
   uint32_t improve = 0;
   std::string find, between, output;
 };
 
 absl::Status CheckQuestion(const CheckOptions& options) {
+  if (options.noise_us && !(*options.noise_us > 0 && std::isfinite(*options.noise_us)))
+    return absl::InvalidArgumentError(
+        absl::StrCat("--noise: ", *options.noise_us, "; a positive number of us was expected"));
   const bool asked = !options.find.empty() || !options.between.empty();
   if (options.improve > 0 && options.output.empty())
     return absl::InvalidArgumentError("--improve: -o FILE was expected, where the touches are written");
@@ -37,7 +43,7 @@ absl::Status RunCheck(const Cli& cli, const CheckOptions& options) {
       CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CheckRequest request;
-  request.set_noise_us(options.noise_us);
+  request.set_noise_us(options.noise_us.value_or(0));
   request.set_improve(options.improve);
   request.set_find(options.find);
   if (!options.between.empty())
@@ -85,8 +91,7 @@ void AddCheck(Cli* cli) {
   command
       ->add_option("--noise", options->noise_us,
                    "Standard deviation of one finger's time, us. Default: that of the model's noise")
-      ->type_name("US")
-      ->check(CLI::PositiveNumber);
+      ->type_name("US");
   command
       ->add_option("--improve", options->improve,
                    "Propose N further touches that help with a question; with -o")

@@ -80,7 +80,7 @@ TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
   EXPECT_THAT(message({"--find", "tip_radius"}), HasSubstr("belong to --improve"));
   EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}),
               HasSubstr("'tip_radios'"));
-  EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise"));
+  EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise: -5; a positive number of us was expected"));
   Write("silent.yaml", "touchstone: model/1\nname: silent\nend_effector: {fingers: 3, spacing_mm: 30}\n");
   const Outcome silent = Run({"check", "plan.csv", "--model", "silent.yaml"});
   EXPECT_THAT(silent.err, AllOf(HasSubstr("'silent' has no noise"), HasSubstr("--noise 5")));
