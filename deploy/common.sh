@@ -85,16 +85,16 @@ install_python_test_packages() {
   fi
 }
 
-# An environment of its own with PyPI's current gRPC, protobuf and NumPy beside Grain and Ray, which need them: for
-# test_grain.py and test_ray.py of client/python/tests. Where PyPI cannot be reached those are skipped, and say so.
+# An environment of its own with PyPI's current gRPC, protobuf and NumPy beside Grain, Ray and datasets, which need them: for
+# test_grain.py, test_ray.py and test_formats.py of client/python/tests. Where PyPI cannot be reached those are skipped, and say so.
 install_current_python() {
-  local wanted='grain==0.2.18 ray[data]==2.60.0 grpcio==1.85.1 protobuf==7.36.2 numpy==2.4.6' into=$root/build/current_venv
+  local wanted='grain==0.2.18 ray[data]==2.60.0 grpcio==1.85.1 protobuf==7.36.2 numpy==2.4.6 datasets==5.2.0' into=$root/build/current_venv
   if [[ ! -f $into/installed || $(< "$into/installed") != "$wanted" ]]; then
     rm -rf "$into"
     /usr/bin/python3 -m venv "$into" || return
     # shellcheck disable=SC2086
     if ! "$into/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 10 $wanted; then
-      echo "PyPI cannot be reached: the tests with Grain and Ray are skipped"
+      echo "PyPI cannot be reached: the tests with Grain, Ray and datasets are skipped"
       return 0
     fi
     printf '%s' "$wanted" > "$into/installed"

@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
+#include "client/cli/child_program.h"
 #include "client/cli/common.h"
 #include "server/base/status.h"
 
@@ -87,6 +88,8 @@ absl::Status BecomePythonCommand(const PythonCommand& command, const std::vector
   std::vector<char*> raw;
   for (std::string& word : words) raw.push_back(word.data());
   raw.push_back(nullptr);
+  // Modules that need this program, to read a journal, find it there.
+  ::setenv("TOUCHSTONE_PROGRAM", PathBesideThisProgram("touchstone").c_str(), /*overwrite=*/1);
   std::fflush(stdout);
   ::execv(raw[0], raw.data());
   return absl::NotFoundError(absl::StrCat(*python, " cannot be started: ", std::strerror(errno)));

@@ -78,7 +78,7 @@ class WithPrograms(Distribution):
 
 # First of all: setuptools wants to see every package, and a fresh clone has no stubs yet.
 generate_stubs()
-arguments = {"packages": ["touchstone", "touchstone.v1"], "install_requires": dependencies(), "entry_points": {},
+arguments = {"packages": ["touchstone", "touchstone.formats", "touchstone.v1"], "install_requires": dependencies(), "entry_points": {},
              "cmdclass": {"build_py": BuildPy}}
 if PROGRAMS:
     names = sorted(path.name for path in (pathlib.Path(PROGRAMS) / "bin").iterdir())

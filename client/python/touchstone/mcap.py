@@ -30,23 +30,23 @@ from .printable import printable
 from .v1 import types_pb2
 from .whole_file import whole_file
 
-_SECOND_NS = 1_000_000_000
+SECOND_NS = 1_000_000_000
 
-_TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
 _XYZ = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyz"}}
 _XYZW = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyzw"}}
 # As https://docs.foxglove.dev/docs/visualization/message-schemas publishes them.
 _POSE_IN_FRAME = {
     "title": "foxglove.PoseInFrame", "type": "object",
     "properties": {
-        "timestamp": _TIME, "frame_id": {"type": "string"},
+        "timestamp": TIME, "frame_id": {"type": "string"},
         "pose": {"type": "object", "properties": {"position": _XYZ, "orientation": _XYZW}},
     },
 }
-_COMPRESSED_IMAGE = {
+COMPRESSED_IMAGE = {
     "title": "foxglove.CompressedImage", "type": "object",
     "properties": {
-        "timestamp": _TIME, "frame_id": {"type": "string"},
+        "timestamp": TIME, "frame_id": {"type": "string"},
         "data": {"type": "string", "contentEncoding": "base64"}, "format": {"type": "string"},
     },
 }
@@ -56,14 +56,14 @@ class ExportError(Exception):
     """What went wrong, on which file, and what would be right."""
 
 
-def _time(unix_s: float) -> dict[str, int]:
+def time_of(unix_s: float) -> dict[str, int]:
     ns = _ns(unix_s)
-    return {"sec": ns // _SECOND_NS, "nsec": ns % _SECOND_NS}
+    return {"sec": ns // SECOND_NS, "nsec": ns % SECOND_NS}
 
 
 def _ns(unix_s: float) -> int:
     # MCAP has no time before 1970; a session whose times are unknown begins there.
-    return max(0, round(unix_s * _SECOND_NS)) if math.isfinite(unix_s) else 0
+    return max(0, round(unix_s * SECOND_NS)) if math.isfinite(unix_s) else 0
 
 
 def _pose(position: Any, rotation: Any) -> dict[str, dict[str, float]]:
@@ -227,7 +227,7 @@ def export(session: str | os.PathLike[str], output: str | os.PathLike[str]) -> d
     try:
         from mcap.writer import Writer
     except ImportError as error:
-        raise ExportError(f"{error}; install them with: pip install 'touchstone[mcap]'") from None
+        raise ExportError(f"{error}; install them with: pip install 'touchstone-sim[mcap]'") from None
     with SessionFile(session) as source, whole_file(output, "wb") as stream:
         return _write(source, Writer(stream))
 
@@ -248,7 +248,7 @@ def _write(source: SessionFile, writer: Any) -> dict[str, int]:
 
     for topic, message in (("/touch", types_pb2.RecordedTouch), ("/arm_state", types_pb2.RecordedArmState)):
         add_channel(topic, message.DESCRIPTOR.full_name, "protobuf", "protobuf", _file_descriptor_set(message))
-    for topic, schema in (("/tip", _POSE_IN_FRAME), ("/camera", _COMPRESSED_IMAGE), ("/camera_pose", _POSE_IN_FRAME)):
+    for topic, schema in (("/tip", _POSE_IN_FRAME), ("/camera", COMPRESSED_IMAGE), ("/camera_pose", _POSE_IN_FRAME)):
         add_channel(topic, str(schema["title"]), "jsonschema", "json", json.dumps(schema).encode())
 
     def add(topic: str, unix_s: float, data: Any) -> None:
@@ -266,18 +266,18 @@ def _write(source: SessionFile, writer: Any) -> dict[str, int]:
             if math.isfinite(time_s) and pose.HasField("position_m"):
                 at_s = measured.start_unix_s + time_s
                 p, r = pose.position_m, pose.rotation_rad
-                add("/tip", at_s, {"timestamp": _time(at_s), "frame_id": "base",
+                add("/tip", at_s, {"timestamp": time_of(at_s), "frame_id": "base",
                                    "pose": _pose((p.x, p.y, p.z), (r.x, r.y, r.z))})
     for row, state in source.arm_states():
         at_s = began[row] + state.time_s
         add("/arm_state", at_s, state)
         p, r = state.base_from_tip.position_m, state.base_from_tip.rotation_rad
-        add("/tip", at_s, {"timestamp": _time(at_s), "frame_id": "base",
+        add("/tip", at_s, {"timestamp": time_of(at_s), "frame_id": "base",
                            "pose": _pose((p.x, p.y, p.z), (r.x, r.y, r.z))})
     for unix_s, png, (position, rotation) in source.photographs():
-        add("/camera", unix_s, {"timestamp": _time(unix_s), "frame_id": "camera", "format": "png",
+        add("/camera", unix_s, {"timestamp": time_of(unix_s), "frame_id": "camera", "format": "png",
                                 "data": base64.b64encode(png).decode()})
-        add("/camera_pose", unix_s, {"timestamp": _time(unix_s), "frame_id": "base", "pose": _pose(position, rotation)})
+        add("/camera_pose", unix_s, {"timestamp": time_of(unix_s), "frame_id": "base", "pose": _pose(position, rotation)})
     writer.finish()
     return counts
 

@@ -16,10 +16,10 @@ from .errors import InvalidRequest
 from .plans import Touches, touches as make_touches
 from .whole_file import whole_file
 
-_VECTORS = {"target_mm": ("target_x_mm", "target_y_mm", "target_z_mm"),
+VECTORS = {"target_mm": ("target_x_mm", "target_y_mm", "target_z_mm"),
             "approach": ("approach_x", "approach_y", "approach_z"),
             "lateral": ("lateral_x", "lateral_y", "lateral_z")}
-_HEAD = ["touch", "object", "speed_mm_s", "standoff_mm", *(name for names in _VECTORS.values() for name in names)]
+_HEAD = ["touch", "object", "speed_mm_s", "standoff_mm", *(name for names in VECTORS.values() for name in names)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,8 +64,8 @@ def read_plan(path: str | os.PathLike[str]) -> list[Row]:
         if len(cells) != len(header):
             raise InvalidRequest(f"{os.fspath(path)}:{line}: {len(cells)} fields, but the header has {len(header)}.")
         row = dict(zip(header, cells))
-        number = functools.partial(_number, f"{os.fspath(path)}:{line}", row)
-        columns: dict[str, Any] = {name: [number(part) for part in parts] for name, parts in _VECTORS.items()}
+        number = functools.partial(number_in, f"{os.fspath(path)}:{line}", row)
+        columns: dict[str, Any] = {name: [number(part) for part in parts] for name, parts in VECTORS.items()}
         columns.update({name: number(name) for name in covariates if row[name]})
         session_time_s = number("session_time_s") if row.get("session_time_s") else None
         if session_time_s is not None:
@@ -77,7 +77,7 @@ def read_plan(path: str | os.PathLike[str]) -> list[Row]:
     return rows
 
 
-def _number(place: str, row: Mapping[str, str], name: str, empty: float | None = None) -> float:
+def number_in(place: str, row: Mapping[str, str], name: str, empty: float | None = None) -> float:
     """The number in a row's column; `empty` where nothing is written, if that may be."""
     text = row[name]
     try:
@@ -113,7 +113,7 @@ def _cells(row: Row, has_time: bool, covariates: Sequence[str]) -> Iterator[str]
     yield row.object
     yield text(row.command.speed_mm_s[0])
     yield text(row.command.standoff_mm[0])
-    for name in _VECTORS:
+    for name in VECTORS:
         # Directions keep every digit: their length is checked.
         for value in getattr(row.command, name)[0]:
             yield text(value) if name == "target_mm" else repr(float(value))

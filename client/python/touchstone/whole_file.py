@@ -1,9 +1,11 @@
-"""Files that are whole or not there: the one way in which this package writes one."""
+"""Files and folders that are whole or not there: the one way in which this package writes one."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import pathlib
+import shutil
 import tempfile
 from collections.abc import Iterator
 from typing import IO, Any
@@ -30,7 +32,39 @@ def whole_file(path: str | os.PathLike[str], mode: str = "w", **options: Any) ->
         with contextlib.suppress(OSError):
             os.unlink(part)
         raise
-    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | os.PathLike[str]) -> Iterator[pathlib.Path]:
+    """A folder to write files to, which takes the place of `path` (a folder of before goes) when the block ends, and is gone when
+    it ends with an error. All that is in it is on the disk before it gets its name."""
+    name = pathlib.Path(os.path.realpath(path))
+    part = pathlib.Path(tempfile.mkdtemp(dir=name.parent, prefix=f".{name.name[:200]}.", suffix=".part"))
+    try:
+        yield part
+        for folder, _, files in os.walk(part, topdown=False):
+            for file in files:
+                _sync(os.path.join(folder, file), os.O_RDONLY)
+            _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+        mask = os.umask(0)
+        os.umask(mask)
+        part.chmod(0o777 & ~mask)
+        if name.exists():
+            before = pathlib.Path(tempfile.mkdtemp(dir=name.parent, prefix=f".{name.name[:200]}.", suffix=".before"))
+            name.rename(before)
+            part.rename(name)
+            shutil.rmtree(before)
+        else:
+            part.rename(name)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    _sync(str(name.parent), os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _sync(path: str, flags: int) -> None:
+    opened = os.open(path, flags)
     try:
         os.fsync(opened)
     finally:

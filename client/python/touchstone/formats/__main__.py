@@ -1,0 +1,76 @@
+"""touchstone export and touchstone import."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+
+from .. import command
+from ..errors import InvalidRequest
+from .exporting import FORMATS, export
+
+_EXPORT_EXAMPLES = """touchstone export data --to parquet -o data-parquet            a dataset of touchstone stream
+touchstone export data --to lerobot -o data-lerobot
+touchstone export session.db --to mcap -o monday                a session of a rig, with pictures and arm states
+touchstone export set.csv --to parquet -o set-parquet           a measurement file"""
+
+
+class _Progress:
+    """How far it is, once it takes longer than two seconds: on a terminal in place, elsewhere a line every ten seconds."""
+
+    def __init__(self, quiet: bool):
+        self._quiet, self._began, self._said = quiet, time.monotonic(), 0.0
+        self._terminal = sys.stderr.isatty()
+
+    def __call__(self, done: int, rows: int) -> None:
+        took_s = time.monotonic() - self._began
+        if self._quiet or took_s < 2 or took_s - self._said < (0.2 if self._terminal else 10):
+            return
+        self._said = took_s
+        left_s = took_s * (rows - done) / max(done, 1)
+        print(f"{done} of {rows} rows, {left_s:.0f} s left", end="\x1b[K\r" if self._terminal else "\n", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        if self._said and self._terminal:
+            print("\x1b[K", end="\r", file=sys.stderr, flush=True)
+
+
+def export_parser() -> command.CommandParser:
+    parser = command.CommandParser(
+        "export", "Writes a dataset or a session in a format of other tools: Parquet, LeRobot, WebDataset, HDF5, MCAP. Into a new folder "
+        "with a dataset card (README.md); numbers are bit for bit those of the source. Exit code 4 if the dataset is not finished or was "
+        "changed.", _EXPORT_EXAMPLES)
+    parser.add_argument("source", metavar="DATASET", help="The folder of a finished touchstone stream, a measurement file (.csv), a journal "
+                        "(.db), what touchstone session export wrote (.h5), or a folder of photographs (images.csv)")
+    parser.add_argument("--to", metavar="FORMAT", required=True, help=f"{', '.join(FORMATS)}")
+    parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="The folder to make")
+    parser.add_output_options(force=True)
+    return parser
+
+
+def _export(words: list[str]) -> None:
+    options = export_parser().parse(words)
+    if options.to not in FORMATS:
+        raise InvalidRequest(f"--to: unknown format '{options.to}'{command.did_you_mean(options.to, list(FORMATS))}")
+    progress = _Progress(options.quiet)
+    try:
+        written = export(options.source, options.out, options.to, force=options.force, on_rows=progress)
+    finally:
+        progress.clear()
+    if options.json:
+        print(json.dumps({"folder": str(written.folder), "format": written.format, "rows": written.rows, "files": list(written.files),
+                          "bytes": written.bytes}, indent=2))
+    files = "1 file" if len(written.files) == 1 else f"{len(written.files)} files"
+    command.log(options.quiet, f"wrote {written.folder}: {written.rows} rows as {written.format}, {files}, {written.bytes / 1e6:.1f} MB")
+
+
+def main(words: list[str]) -> None:
+    commands = {"export": _export}
+    if not words or words[0] not in commands:
+        raise InvalidRequest(f"'{words[0] if words else ''}' is no command of touchstone.formats; one of {', '.join(commands)} was expected.")
+    commands[words[0]](words[1:])
+
+
+if __name__ == "__main__":
+    command.run(main)
