@@ -43,7 +43,7 @@ def lab_value(si_name: str, value: float) -> float:
     return value * _rule(si_name)[1]
 
 
-def si_value(si_name: str, value: float) -> float:
+def si_value(si_name: str, value: Any) -> Any:
     """A number in the lab's unit, as the wire's `si_name` wants it."""
     # Dividing by an exact power of ten rounds once: 20 mm/s becomes the double nearest to 0.02 m/s.
     return value / _rule(si_name)[1]

@@ -41,8 +41,8 @@ def _provenance(table: Table, manifest: str) -> list[str]:
     lines = ["## Provenance", ""]
     if found["kind"] == "dataset":
         model = found["model"]
-        lines += [f"Simulated by touchstone {found['versions']['source']}, seed {found['seed']}, model {model['name']} (hash `{model['hash']}`). The same bytes "
-                  f"once more, anywhere: `touchstone stream --like {manifest} --out again`.", "",
+        lines += [f"Simulated by touchstone {found['versions']['source']}, seed {found['seed']}, model {model['name']} (hash `{model['hash']}`).",
+                  f"The same bytes once more, anywhere: `touchstone stream --like {manifest} --out again`.", "",
                   "The specification:", "", "```json", json.dumps(found["specification"], indent=2), "```", "",
                   "The model:", "", "```yaml", model.get("yaml", "").rstrip(), "```", "",
                   "The meshes:", "", *(f"- {entry['name']}: `{entry['mesh_hash']}`" for entry in found["objects"])]

@@ -16,8 +16,11 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotFound, Refused
 from ..measurements import VECTORS
+from ..units import lab_array, si_value
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
+_SI_NAMES = {"contact_time_us": "contact_time_s", "target_mm": "target_m", "standoff_mm": "standoff_m", "speed_mm_s": "speed_m_s"}
+_IN_TEXT = ("target_mm", "approach", "lateral", "standoff_mm", "speed_mm_s")
 _VERIFY = "`touchstone dataset verify` says what is wrong"
 
 
@@ -67,7 +70,7 @@ class DatasetFolder(Table):
                     samples.append({})
                     key = sample
                 if place == "json":
-                    samples[-1].update(self._described(json.loads(data)))
+                    samples[-1].update(self._described(json.loads(data, parse_int=_whole_number)))
                 elif place.endswith(".npy"):
                     samples[-1][place[:-4]] = np.load(io.BytesIO(data), allow_pickle=False)
                 else:
@@ -78,7 +81,7 @@ class DatasetFolder(Table):
     def _described(self, sample: dict[str, Any]) -> dict[str, Any]:
         if "object" in sample:
             sample["object"] = self.objects.index(sample["object"])
-        return sample
+        return {name: _as_streamed(name, value) if name in _IN_TEXT else value for name, value in sample.items()}
 
     def _from_folder(self, path: pathlib.Path) -> Iterator[dict[str, Values]]:
         arrays = {file.stem: np.load(file, mmap_mode="r", allow_pickle=False) for file in path.glob("*.npy")}
@@ -90,11 +93,11 @@ class DatasetFolder(Table):
             for k, row in enumerate(part, begin):
                 sample: dict[str, Any] = {name: array[k] for name, array in arrays.items()}
                 sample |= {"index": int(row["touch"]), "object": self.objects.index(row["object"])}
-                sample |= {name: [np.float32(row[part]) for part in parts] for name, parts in VECTORS.items() if parts[0] in row}
-                sample |= {name: np.float32(row[name]) for name in ("standoff_mm", "speed_mm_s") if name in row}
+                sample |= {name: _as_streamed(name, [row[part] for part in parts]) for name, parts in VECTORS.items() if parts[0] in row}
+                sample |= {name: _as_streamed(name, row[name]) for name in ("standoff_mm", "speed_mm_s") if name in row}
                 times = [row[name] for name in row if name.startswith("t_") and name.endswith("_us")]
                 if times and "contact_time_us" not in sample:
-                    sample["contact_time_us"] = [np.float32(time or "nan") for time in times]
+                    sample["contact_time_us"] = _as_streamed("contact_time_us", [time or "nan" for time in times])
                 if pictures:
                     sample["image"] = pictures[k].read_bytes()
                 samples.append(sample)
@@ -106,6 +109,17 @@ class DatasetFolder(Table):
             rows = len(file[names[0]])
             for begin in range(0, rows, ROWS_OF_A_BATCH):
                 yield {name: file[name][begin : begin + ROWS_OF_A_BATCH] for name in names}
+
+
+def _as_streamed(name: str, decimals: Any) -> Any:
+    """The float32 values of which the program wrote the decimals: those of SI, and from them the lab's as other formats have them."""
+    si_name = _SI_NAMES.get(name, name)
+    return lab_array(si_name, np.asarray(si_value(si_name, np.asarray(decimals, np.float64)), np.float32))
+
+
+def _whole_number(text: str) -> int | float:
+    """Of JSON, where -0 is a float: the program writes every number as short as it can."""
+    return -0.0 if text == "-0" else int(text)
 
 
 def _check(path: pathlib.Path, shard: dict[str, Any]) -> None:

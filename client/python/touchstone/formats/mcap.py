@@ -30,7 +30,8 @@ _RAW_ENCODINGS = {"float32": "32FC1", "uint8": "mono8"}
 
 def write_mcap(table: Table, folder: pathlib.Path) -> None:
     writer_module = need("mcap.writer", "export to MCAP", "mcap")
-    pictures = {column.name: column for column in table.columns if column.is_image or (len(column.shape) == 2 and column.name in ("depth_mm", "mask"))}
+    pictures = {column.name: column for column in table.columns
+                if column.is_image or (len(column.shape) == 2 and column.name in ("depth_mm", "mask"))}
     with open(folder / "data.mcap", "wb") as stream:
         writer = writer_module.Writer(stream)
         writer.start(profile="", library=f"touchstone {__version__}")
