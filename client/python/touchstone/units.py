@@ -8,10 +8,12 @@ and values are what labs write: mm, us, deg, mm/s, again with the unit in every 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+_Number = TypeVar("_Number", float, NDArray[Any])
 
 # End of the SI name, end of the lab name, factor. The first match counts, so "_m_s" comes before "_s".
 _RULES = (
@@ -43,7 +45,7 @@ def lab_value(si_name: str, value: float) -> float:
     return value * _rule(si_name)[1]
 
 
-def si_value(si_name: str, value: Any) -> Any:
+def si_value(si_name: str, value: _Number) -> _Number:
     """A number in the lab's unit, as the wire's `si_name` wants it."""
     # Dividing by an exact power of ten rounds once: 20 mm/s becomes the double nearest to 0.02 m/s.
     return value / _rule(si_name)[1]

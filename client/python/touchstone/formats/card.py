@@ -29,8 +29,7 @@ def write_card(table: Table, layout: str, front_matter: dict[str, Any] | None = 
     for column in table.columns:
         kind = f"{column.encoding.upper()} file" if column.encoding else column.dtype
         lines.append(f"| `{column.name}` | {kind} | {' x '.join(map(str, column.shape)) or '1'} | {column.unit} | {column.meaning} |")
-    lines += ["", "Lengths are in mm, times in us, the object frame is right-handed with z up, as in the mesh file. A finger that reported "
-              "nothing has NaN.", ""]
+    lines += ["", "Lengths are in mm, times in us, the object frame is right-handed with z up, as in the mesh file.", ""]
     if table.objects:
         lines += ["## Objects", "", ", ".join(f"{k}: {name}" for k, name in enumerate(table.objects)), ""]
     return "\n".join(lines + _provenance(table, manifest_name(shards))) + "\n"
