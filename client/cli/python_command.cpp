@@ -54,7 +54,7 @@ const std::vector<PythonCommand>& PythonCommands() {
        "--to --out -o --force --json --quiet -q --help -h"},
       {"import", "Makes a measurement set of another tool's file: MCAP, ROS 2 bag, LeRobot, Parquet.",
        "touchstone.formats", "import", "touchstone-sim[formats]",
-       "--map --out -o --force --json --quiet -q --help -h"},
+       "--map --out -o --list --force --json --quiet -q --help -h"},
   };
   return commands;
 }

@@ -5,10 +5,12 @@
 
     from touchstone.formats import export
     export("data", "data-parquet", to="parquet")
+    import_recording("recording.mcap", "set.csv", "mapping.yaml")
 
 Needs the extra `touchstone-sim[formats]` (pyarrow, mcap, h5py, pillow, pyyaml, rosbags).
 """
 
 from .exporting import FORMATS, Exported, export
+from .importing import Imported, OpenQuestions, import_recording
 
-__all__ = ["FORMATS", "Exported", "export"]
+__all__ = ["FORMATS", "Exported", "Imported", "OpenQuestions", "export", "import_recording"]

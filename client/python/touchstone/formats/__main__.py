@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import json
+import pathlib
 import sys
 import time
 
 from .. import command
 from ..errors import InvalidRequest
+from ..printable import printable
 from .exporting import FORMATS, export
+from .importing import import_recording
+from .recordings import open_recording
 
 _EXPORT_EXAMPLES = """touchstone export data --to parquet -o data-parquet            a dataset of touchstone stream
 touchstone export data --to lerobot -o data-lerobot
 touchstone export session.db --to mcap -o monday                a session of a rig, with pictures and arm states
 touchstone export set.csv --to parquet -o set-parquet           a measurement file"""
+
+_IMPORT_EXAMPLES = """touchstone import recording.mcap --list                           its topics and fields
+touchstone import recording.mcap --map mapping.yaml -o set.csv   then: touchstone compare set.csv ...
+touchstone import bag_folder --map mapping.yaml -o session.db    a ROS 2 bag, SQLite or MCAP
+touchstone import lerobot_folder --map mapping.yaml -o set.csv
+touchstone import table.parquet -o set.csv                       columns with this program's names need no mapping"""
 
 
 class _Progress:
@@ -65,8 +75,53 @@ def _export(words: list[str]) -> None:
     command.log(options.quiet, f"wrote {written.folder}: {written.rows} rows as {written.format}, {files}, {written.bytes / 1e6:.1f} MB")
 
 
+def import_parser() -> command.CommandParser:
+    parser = command.CommandParser(
+        "import", "Makes a measurement set of another tool's file: MCAP, ROS 2 bag, LeRobot, Parquet. A mapping file says which topic or column is "
+        "pose, time, joint, object and finger contact; what it leaves open is asked, with the candidates, and never guessed. What compare "
+        "and diagnose cannot read is not written.", _IMPORT_EXAMPLES)
+    parser.add_argument("source", metavar="FILE", help="An MCAP file, the folder of a ROS 2 bag or of a LeRobot dataset v3, a Parquet file or a "
+                        "folder of them")
+    parser.add_argument("--map", metavar="FILE", help="The mapping, YAML; client/python/FORMATS.md says what may stand in it")
+    parser.add_argument("-o", "--out", metavar="FILE", help="The set: .csv, or a journal (.db)")
+    parser.add_argument("--list", action="store_true", help="Say what the file has, and write nothing")
+    parser.add_output_options(force=True)
+    return parser
+
+
+def _import(words: list[str]) -> None:
+    parser = import_parser()
+    options = parser.parse(words)
+    if options.list:
+        return _list(options.source, options.json)
+    if options.out is None:
+        parser.error("-o/--out is required")
+    made = import_recording(options.source, options.out, options.map, force=options.force)
+    if options.json:
+        print(json.dumps({"file": str(made.path), "touches": made.rows, "left_out": list(made.left_out)}, indent=2))
+    for reason in made.left_out[:5]:
+        command.log(options.quiet, f"left out: {reason}")
+    more = f", {len(made.left_out)} messages left out" if made.left_out else ""
+    command.log(options.quiet, f"wrote {made.path} ({made.rows} touches{more})")
+    return None
+
+
+def _list(source: str, as_json: bool) -> None:
+    recording = open_recording(pathlib.Path(source))
+    if as_json:
+        print(json.dumps({"kind": recording.kind, "topics": [{"name": topic.name, "type": topic.kind, "messages": topic.rows, "fields": {
+            path: topic.describe(path) for path in topic.fields}} for topic in recording.topics.values()]}, indent=2))
+        return
+    print(f"{recording.path}: {recording.kind}")
+    for topic in recording.topics.values():
+        print(f"\n{topic.name or 'table'}  {topic.kind}, {topic.rows} {'messages' if topic.name else 'rows'}")
+        width = max((len(path) for path in topic.fields), default=0)
+        for path in topic.fields:
+            print(printable(f"  {path:<{width}}  {topic.describe(path)}"))
+
+
 def main(words: list[str]) -> None:
-    commands = {"export": _export}
+    commands = {"export": _export, "import": _import}
     if not words or words[0] not in commands:
         raise InvalidRequest(f"'{words[0] if words else ''}' is no command of touchstone.formats; one of {', '.join(commands)} was expected.")
     commands[words[0]](words[1:])

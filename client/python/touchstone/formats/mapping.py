@@ -33,8 +33,10 @@ TIMES = {"us": 1.0, "ms": 1e3, "s": 1e6, "ns": 1e-3}
 SPEEDS = {"mm/s": 1.0, "m/s": 1e3, "cm/s": 10.0}
 ANGLES = {"rad": 57.29577951308232, "deg": 1.0}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_ORDERS = ("xyzw", "wxyz")
-_AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+ORDERS = ("xyzw", "wxyz")
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+# A unit vector or quaternion is one within what four digits leave; it is then made exact.
+UNIT_WITHIN = 1e-3
 # Ends of names that say the unit.
 _UNIT_ENDS = (("_mm_s", "mm/s"), ("_m_s", "m/s"), ("_mm", "mm"), ("_cm", "cm"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"), ("_deg", "deg"),
               ("_rad", "rad"), ("_m", "m"), ("_s", "s"))
@@ -117,7 +119,7 @@ class Mapping:
             raise InvalidRequest(f"{self.origin}: {entry}: unknown entry '{unknown[0]}'"
                                  f"{did_you_mean(unknown[0], ['topic', 'field', 'fields', 'value', 'unit'])}.")
         if "value" in said:
-            return Source("", (), self._factor(entry, what, units, said, ()), said["value"])
+            return Source("", (), self.factor(entry, what, units, said, ()), said["value"])
         topic = self.topic(entry, said["topic"]) if "topic" in said else self.touches
         if topic is None:
             return None
@@ -125,13 +127,13 @@ class Mapping:
         if not names:
             self._ask_field(entry, what, topic, counts, words, text)
             return None
-        fields = tuple(self._field(entry, topic, name) for name in names)
+        fields = tuple(self.field(entry, topic, part) for name in names for part in self.expanded(topic, name))
         count = sum(_width(topic, field) for field in fields)
         if counts and count not in counts and not text:
             raise InvalidRequest(f"{self.origin}: {entry}: {', '.join(fields)} has {count} numbers; {' or '.join(map(str, counts))} were expected.")
-        return Source(topic.name, fields, self._factor(entry, what, units, said, fields))
+        return Source(topic.name, fields, self.factor(entry, what, units, said, fields))
 
-    def _field(self, entry: str, topic: Topic, name: str) -> str:
+    def field(self, entry: str, topic: Topic, name: str) -> str:
         if name in topic.fields:
             return name
         where = f"topic {topic.name}" if topic.name else "the table"
@@ -141,7 +143,7 @@ class Mapping:
         """The field itself, or its parts x, y, z (and w) where it is a message."""
         if name in topic.fields:
             return (name,)
-        return tuple(f"{name}.{part}" for part in ("x", "y", "z", "w") if f"{name}.{part}" in topic.fields)
+        return tuple(f"{name}.{part}" for part in ("x", "y", "z", "w") if f"{name}.{part}" in topic.fields) or (name,)
 
     def _found(self, entry: str, what: str, units: dict[str, float] | None, counts: tuple[int, ...], words: tuple[str, ...], required: bool,
                text: bool) -> dict[str, Any] | None:
@@ -169,7 +171,7 @@ class Mapping:
             self.questions.ask(f"{entry}: which field of {where} is {what}? None looks like it; give it as {{value: ...}}, or a field of another "
                                f"topic. There are {', '.join(list(topic.fields)[:12])}{' ...' if len(topic.fields) > 12 else ''}.")
 
-    def _factor(self, entry: str, what: str, units: dict[str, float] | None, said: dict[str, Any], fields: tuple[str, ...]) -> float:
+    def factor(self, entry: str, what: str, units: dict[str, float] | None, said: dict[str, Any], fields: tuple[str, ...]) -> float:
         if units is None:
             return 1.0
         if "unit" in said:

@@ -228,11 +228,11 @@ def _protobuf_class(schema: Any) -> Any:
             file = left.pop(name)
             for dependency in file.dependency:
                 add(dependency)
-            pool.Add(file)  # type: ignore[no-untyped-call]
+            pool.Add(file)
 
     for name in list(left):
         add(name)
-    descriptor = pool.FindMessageTypeByName(schema.name)  # type: ignore[no-untyped-call]
+    descriptor = pool.FindMessageTypeByName(schema.name)
     if hasattr(message_factory, "GetMessageClass"):
         return message_factory.GetMessageClass(descriptor)
     return message_factory.MessageFactory(pool).GetPrototype(descriptor)  # type: ignore[attr-defined]  # protobuf before 4.22
