@@ -123,7 +123,8 @@ def test_compare_reads_what_was_imported(rows, run, tmp_path):
     done = run("compare", tmp_path / "set.db", "--model", "nominal", "--json", "-")
     assert done.returncode == 0, done.stderr
     # The noise that was planted is what compare finds.
-    assert json.loads(done.stdout)["data"][0]["initial"]["rmse_us"] == pytest.approx(5000, rel=0.1)
+    data = json.loads(done.stdout)["data"][0]
+    assert data["unit"] == "us" and data["initial"]["rmse"] == pytest.approx(5000, rel=0.1)
 
 
 def test_a_recording_of_this_program_comes_back(rows, run, tmp_path):

@@ -31,6 +31,7 @@ class _ExamplesFirst(argparse.HelpFormatter):
     def __init__(self, prog: str):
         # As wide as the texts of the other commands: from 60 to 110 columns.
         super().__init__(prog, max_help_position=32, width=min(110, max(60, shutil.get_terminal_size((110, 24)).columns)))
+        self._action_max_length = 30  # texts begin at one column in every help
 
     def _format_action_invocation(self, action: argparse.Action) -> str:
         if not action.option_strings:

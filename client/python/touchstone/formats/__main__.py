@@ -114,7 +114,7 @@ def _list(source: str, as_json: bool) -> None:
         return
     print(f"{recording.path}: {recording.kind}")
     for topic in recording.topics.values():
-        print(f"\n{topic.name or 'table'}  {topic.kind}, {topic.rows} {'messages' if topic.name else 'rows'}")
+        print(printable(f"\n{topic.name}  {topic.kind}, {topic.rows} messages" if topic.name else f"\n{topic.rows} rows"))
         width = max((len(path) for path in topic.fields), default=0)
         for path in topic.fields:
             print(printable(f"  {path:<{width}}  {topic.describe(path)}"))

@@ -33,7 +33,7 @@ class TouchColumns:
         }
         if "contacts" not in self._mapping.entries:
             sources["time_us"] = ask("contact_time", "the fingers' contact times since the approach began", mappings.TIMES, _FINGERS,
-                                     ("contact", "time", "touch", "finger"))
+                                     ("contact", "descriptor", "touch", "finger", "time"))
         posed = "pose" in self._mapping.entries
         if not posed:
             sources["target_mm"] = ask("target", "the point that the middle finger aims at (or give `pose`)", mappings.LENGTHS, (3,),
