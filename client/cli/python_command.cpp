@@ -55,6 +55,11 @@ const std::vector<PythonCommand>& PythonCommands() {
       {"import", "Makes a measurement set of another tool's file: MCAP, ROS 2 bag, LeRobot, Parquet.",
        "touchstone.formats", "import", "touchstone-sim[formats]",
        "--map --out -o --list --force --json --quiet -q --help -h"},
+      {"verify", "Reads a dataset, a session or a shard and says whether it is whole.", "touchstone.formats",
+       "verify", "touchstone-sim[formats]", "--json --quiet -q --help -h"},
+      {"recover", "Saves what is whole of a file that a kill or a full disk cut, and says what that is.",
+       "touchstone.formats", "recover", "touchstone-sim[formats]",
+       "--out -o --force --json --quiet -q --help -h"},
   };
   return commands;
 }

@@ -12,5 +12,6 @@ Needs the extra `touchstone-sim[formats]` (pyarrow, mcap, h5py, pillow, pyyaml, 
 
 from .exporting import FORMATS, Exported, export
 from .importing import Imported, OpenQuestions, import_recording
+from .recovery import Found, recover, verify
 
-__all__ = ["FORMATS", "Exported", "Imported", "OpenQuestions", "export", "import_recording"]
+__all__ = ["FORMATS", "Exported", "Found", "Imported", "OpenQuestions", "export", "import_recording", "recover", "verify"]

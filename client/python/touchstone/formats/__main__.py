@@ -1,4 +1,4 @@
-"""touchstone export and touchstone import."""
+"""touchstone export, import, verify and recover."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import sys
 import time
 
 from .. import command
-from ..errors import InvalidRequest
+from ..errors import InvalidRequest, Refused
 from ..printable import printable
+from . import recovery
 from .exporting import FORMATS, export
 from .importing import import_recording
 from .recordings import open_recording
@@ -120,8 +121,52 @@ def _list(source: str, as_json: bool) -> None:
             print(printable(f"  {path:<{width}}  {topic.describe(path)}"))
 
 
+def verify_parser() -> command.CommandParser:
+    parser = command.CommandParser(
+        "verify", "Reads a dataset, a session or a shard and says whether it is whole. By checksums, where the format has some; a cut or a "
+        "changed file has exit code 4.", "touchstone verify data                a folder of touchstone stream\n"
+        "touchstone verify session.db\ntouchstone verify shard-000003.tar")
+    parser.add_argument("source", metavar="FILE", help="A dataset's folder, a shard (.tar), a journal (.db), an exported session (.h5), a "
+                        "measurement file (.csv), MCAP or Parquet")
+    parser.add_output_options()
+    return parser
+
+
+def recover_parser() -> command.CommandParser:
+    parser = command.CommandParser(
+        "recover", "Saves what is whole of a file that a kill or a full disk cut, and says what that is. The file itself is not changed.",
+        "touchstone recover shard-000003.tar -o saved.tar     the samples before the cut\n"
+        "touchstone recover log.mcap -o saved.mcap            the messages before the cut\n"
+        "touchstone recover session.db -o saved.csv           the touches whose checksums are right")
+    parser.add_argument("source", metavar="FILE", help="A shard (.tar), MCAP, a journal (.db) or a measurement file (.csv)")
+    parser.add_argument("-o", "--out", metavar="FILE", required=True, help="The file to write; of a journal .csv or .db")
+    parser.add_output_options(force=True)
+    return parser
+
+
+def _verify(words: list[str]) -> None:
+    options = verify_parser().parse(words)
+    found = recovery.verify(options.source)
+    _tell(found, options.json)
+    if not found.whole:
+        raise Refused(f"{found.path} is not whole: {found.saved} can be read; lost: {found.lost}. `touchstone recover` saves what it can.")
+    command.log(options.quiet, f"{found.path} is whole: {found.saved}")
+
+
+def _recover(words: list[str]) -> None:
+    options = recover_parser().parse(words)
+    found = recovery.recover(options.source, options.out, force=options.force)
+    _tell(found, options.json)
+    command.log(options.quiet, f"wrote {options.out}: {found.saved} saved" + (f"; lost: {found.lost}" if found.lost else "; nothing was lost"))
+
+
+def _tell(found: recovery.Found, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"file": str(found.path), "whole": found.whole, "saved": found.saved, "lost": found.lost}, indent=2))
+
+
 def main(words: list[str]) -> None:
-    commands = {"export": _export, "import": _import}
+    commands = {"export": _export, "import": _import, "verify": _verify, "recover": _recover}
     if not words or words[0] not in commands:
         raise InvalidRequest(f"'{words[0] if words else ''}' is no command of touchstone.formats; one of {', '.join(commands)} was expected.")
     commands[words[0]](words[1:])

@@ -9,7 +9,7 @@ import io
 import json
 import pathlib
 import tarfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -43,19 +43,22 @@ class DatasetFolder(Table):
             if rows != shard["samples"]:
                 raise Refused(f"{path}: {rows} samples, but dataset.json says {shard['samples']}; {_VERIFY}.")
 
-    def _gathered(self, samples: list[dict[str, Any]]) -> dict[str, Values]:
+    def _gathered(self, samples: list[dict[str, Any]], decimals: Collection[str]) -> dict[str, Values]:
+        """Samples as columns; those in `decimals` were written as text."""
         batch: dict[str, Values] = {}
         for column in self.columns:
             if column.name == "object_name":
                 continue
             values = [sample[column.name] for sample in samples]
+            if column.name in decimals:
+                values = _as_streamed(column.name, values)
             batch[column.name] = values if column.encoding else np.array(values, column.dtype).reshape(len(values), *column.shape)
         return batch
 
     def _from_tar(self, path: pathlib.Path) -> Iterator[dict[str, Values]]:
         """Files KEY.json, KEY.COLUMN.npy and KEY.image.png of each sample stand together."""
         samples: list[dict[str, Any]] = []
-        key = None
+        key, arrays = None, _NpyReader()
         with tarfile.open(path, "r|") as archive:
             for member in archive:
                 file = archive.extractfile(member)
@@ -65,43 +68,45 @@ class DatasetFolder(Table):
                 sample, _, place = member.name.partition(".")
                 if sample != key:
                     if len(samples) == ROWS_OF_A_BATCH:
-                        yield self._gathered(samples)
+                        yield self._gathered(samples, _IN_TEXT)
                         samples = []
                     samples.append({})
                     key = sample
                 if place == "json":
                     samples[-1].update(self._described(json.loads(data, parse_int=_whole_number)))
                 elif place.endswith(".npy"):
-                    samples[-1][place[:-4]] = np.load(io.BytesIO(data), allow_pickle=False)
+                    samples[-1][place[:-4]] = arrays.read(data)
                 else:
                     samples[-1][place.rpartition(".")[0]] = data
         if samples:
-            yield self._gathered(samples)
+            yield self._gathered(samples, _IN_TEXT)
 
     def _described(self, sample: dict[str, Any]) -> dict[str, Any]:
         if "object" in sample:
             sample["object"] = self.objects.index(sample["object"])
-        return {name: _as_streamed(name, value) if name in _IN_TEXT else value for name, value in sample.items()}
+        return sample
 
     def _from_folder(self, path: pathlib.Path) -> Iterator[dict[str, Values]]:
         arrays = {file.stem: np.load(file, mmap_mode="r", allow_pickle=False) for file in path.glob("*.npy")}
         with open(path / "touches.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
+        decimals = set(_IN_TEXT)
         pictures = sorted(file for file in path.iterdir() if file.suffix in (".png", ".jpg", ".jpeg"))
         for begin in range(0, len(rows), ROWS_OF_A_BATCH):
             part, samples = rows[begin : begin + ROWS_OF_A_BATCH], []
             for k, row in enumerate(part, begin):
                 sample: dict[str, Any] = {name: array[k] for name, array in arrays.items()}
                 sample |= {"index": int(row["touch"]), "object": self.objects.index(row["object"])}
-                sample |= {name: _as_streamed(name, [row[part] for part in parts]) for name, parts in VECTORS.items() if parts[0] in row}
-                sample |= {name: _as_streamed(name, row[name]) for name in ("standoff_mm", "speed_mm_s") if name in row}
+                sample |= {name: [row[part] for part in parts] for name, parts in VECTORS.items() if parts[0] in row}
+                sample |= {name: row[name] for name in ("standoff_mm", "speed_mm_s") if name in row}
                 times = [row[name] for name in row if name.startswith("t_") and name.endswith("_us")]
                 if times and "contact_time_us" not in sample:
-                    sample["contact_time_us"] = _as_streamed("contact_time_us", [time or "nan" for time in times])
+                    sample["contact_time_us"] = [time or "nan" for time in times]
+                    decimals.add("contact_time_us")
                 if pictures:
                     sample["image"] = pictures[k].read_bytes()
                 samples.append(sample)
-            yield self._gathered(samples)
+            yield self._gathered(samples, decimals)
 
     def _from_hdf5(self, path: pathlib.Path) -> Iterator[dict[str, Values]]:
         with need("h5py", "reading HDF5").File(path, "r") as file:
@@ -109,6 +114,23 @@ class DatasetFolder(Table):
             rows = len(file[names[0]])
             for begin in range(0, rows, ROWS_OF_A_BATCH):
                 yield {name: file[name][begin : begin + ROWS_OF_A_BATCH] for name in names}
+
+
+class _NpyReader:
+    """Arrays of .npy files, most of which begin alike: what a beginning says is read once."""
+
+    def __init__(self) -> None:
+        self._kinds: dict[bytes, tuple[np.dtype[Any], tuple[int, ...]]] = {}
+
+    def read(self, data: bytes) -> Any:
+        head = data[: 10 + int.from_bytes(data[8:10], "little")]  # of version 1.0
+        if head not in self._kinds:
+            array = np.load(io.BytesIO(data), allow_pickle=False)
+            if data[6:8] != b"\x01\x00" or b"'fortran_order': True" in head:
+                return array
+            self._kinds[head] = (array.dtype, array.shape)
+        dtype, shape = self._kinds[head]
+        return np.frombuffer(data, dtype, offset=len(head)).reshape(shape)
 
 
 def _as_streamed(name: str, decimals: Any) -> Any:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import errno
 import os
 import pathlib
 import shutil
 from collections.abc import Callable, Iterator
 
 from ..command import did_you_mean
-from ..errors import InvalidRequest, NotFound
+from ..errors import InvalidRequest, NotFound, Refused
 from ..mcap import ExportError, export as export_recording
 from ..whole_file import whole_folder
 from . import card, hdf5, lerobot, mcap, parquet, sessions, webdataset
@@ -78,8 +79,15 @@ def export(source: str | os.PathLike[str], out: str | os.PathLike[str], to: str 
     if not path.exists():
         raise NotFound(f"{path} is not there; the folder of a dataset, a measurement file (.csv) or a journal (.db) was expected.")
     _check_target(path, target, force)
-    with whole_folder(target) as folder:
-        rows = _write(path, folder, to, write, on_rows)
+    try:
+        with whole_folder(target) as folder:
+            rows = _write(path, folder, to, write, on_rows)
+    except OSError as error:
+        if error.filename and error.errno != errno.ENOSPC:
+            raise
+        # A library's, which does not say where.
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise Refused(f"{target} could not be written whole, and nothing is left of it: {why}.") from None
     files = sorted(file for file in target.rglob("*") if file.is_file())
     return Exported(target, to, rows, tuple(str(file.relative_to(target)) for file in files), sum(file.stat().st_size for file in files))
 

@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import math
+import os
 import pathlib
+import shutil
 
 import numpy as np
 
@@ -14,6 +18,11 @@ from .table import ROWS_OF_A_BATCH, Table, need, pixels_of
 
 def write_hdf5(table: Table, folder: pathlib.Path) -> None:
     h5py = need("h5py", "export to HDF5")
+    # Where the disk is full the HDF5 library cannot close a file, and crashes when the process ends.
+    needed = table.rows * sum(math.prod(column.shape) * np.dtype(column.dtype).itemsize for column in table.columns
+                              if column.dtype != "text" and column.encoding != "jpeg")
+    if needed > shutil.disk_usage(folder).free:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with h5py.File(folder / "data.h5", "w") as file:
         file.attrs["objects"] = np.array([name.encode() for name in table.objects] or [b""])
         file.attrs["touchstone"] = json.dumps(table.provenance)

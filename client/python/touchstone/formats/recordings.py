@@ -38,6 +38,7 @@ class Topic:
     times_ns: list[int] = dataclasses.field(default_factory=list)
     fields: dict[str, list[Any]] = dataclasses.field(default_factory=dict)
     rows: int = 0
+    _numbers: dict[str, NDArray[np.float64] | None] = dataclasses.field(default_factory=dict)
 
     def add(self, time_ns: int | None, message: Any) -> None:
         if time_ns is not None:
@@ -51,16 +52,9 @@ class Topic:
 
     def numbers(self, path: str) -> NDArray[np.float64] | None:
         """(rows,) or (rows, values) of a field of numbers, NaN where there is none; None if it is no such field."""
-        values = self.fields[path]
-        first = next((value for value in values if value is not None), None)
-        if isinstance(first, (bool, int, float, np.number, np.bool_)):
-            return np.array([np.nan if value is None else float(value) for value in values])
-        if isinstance(first, list) and first and isinstance(first[0], (int, float, np.number, type(None))):
-            if any(value is not None and len(value) != len(first) for value in values):
-                return None
-            blank = [np.nan] * len(first)
-            return np.array([blank if value is None else [np.nan if part is None else float(part) for part in value] for value in values])
-        return None
+        if path not in self._numbers:
+            self._numbers[path] = _as_numbers(self.fields[path])
+        return self._numbers[path]
 
     def describe(self, path: str) -> str:
         """"3 numbers, 0.1 to 2.5" and the like."""
@@ -71,6 +65,18 @@ class Topic:
         count = "a number" if values.ndim == 1 else f"{values.shape[1]} numbers"
         known = values[np.isfinite(values)]
         return f"{count}, {known.min():.6g} to {known.max():.6g}" if known.size else count
+
+
+def _as_numbers(values: list[Any]) -> NDArray[np.float64] | None:
+    first = next((value for value in values if value is not None), None)
+    if isinstance(first, (bool, int, float, np.number, np.bool_)):
+        return np.array(values, np.float64)  # None becomes NaN
+    if isinstance(first, list) and first and isinstance(first[0], (int, float, np.number, type(None))):
+        if any(value is not None and len(value) != len(first) for value in values):
+            return None
+        blank = [np.nan] * len(first)
+        return np.array([blank if value is None else value for value in values], np.float64)
+    return None
 
 
 @dataclasses.dataclass
@@ -140,9 +146,23 @@ def _parquet(path: pathlib.Path, files: list[pathlib.Path]) -> Recording:
                                  "rows.") from None
         kept = [field.name for field in opened.schema_arrow if "binary" not in str(field.type) and not str(field.type).startswith("extension")]
         for batch in opened.iter_batches(columns=kept):
-            for row in batch.to_pylist():
-                topic.add(None, row)
+            _add_columns(topic, batch)
     return Recording(path, "Parquet", {"": topic})
+
+
+def _add_columns(topic: Topic, batch: Any) -> None:
+    """A batch of rows; columns of messages field by field."""
+    columns = {name: batch.column(name) for name in batch.schema.names}
+    if any("struct" in str(column.type) for column in columns.values()):
+        for row in batch.to_pylist():
+            topic.add(None, row)
+        return
+    for name, column in columns.items():
+        values = column.to_pylist()
+        first = next((value for value in values if value is not None), None)
+        if not isinstance(first, list) or (len(first) <= _MAX_VALUES and not (first and isinstance(first[0], list))):
+            topic.fields.setdefault(name, []).extend(values)
+    topic.rows += batch.num_rows
 
 
 def _lerobot(path: pathlib.Path) -> Recording:
