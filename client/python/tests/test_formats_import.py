@@ -46,12 +46,12 @@ def rows(run, tmp_path_factory):
     return touchstone.read_plan(folder / "set.csv")
 
 
-def _quaternion(row):
-    """x, y, z, w of the tool, whose z is the approach and whose x is the lateral vector."""
+def _quaternion(row, along_y=False):
+    """x, y, z, w of the tool, whose z is the approach and whose x is the lateral vector; `along_y`: -y and z."""
     lateral, approach = row.command.lateral[0], row.command.approach[0]
-    matrix = np.stack([lateral, np.cross(approach, lateral), approach], 1)
+    columns = [np.cross(-approach, lateral), -approach, lateral] if along_y else [lateral, np.cross(approach, lateral), approach]
     # The eigenvector of Bar-Itzhack's matrix, which has no case distinctions.
-    m = matrix
+    m = np.stack(columns, 1)
     k = np.array([[m[0, 0] - m[1, 1] - m[2, 2], 0, 0, 0], [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], 0, 0],
                   [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], 0],
                   [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)]])
@@ -206,14 +206,14 @@ def test_what_was_exported_needs_no_mapping(rows, tmp_path):
 
 
 def test_a_table_of_other_names_is_mapped(rows, tmp_path):
-    table = {"part": [row.object for row in rows], "q": [list(np.roll(_quaternion(row), 1)) for row in rows],
+    table = {"part": [row.object for row in rows], "q": [list(np.roll(_quaternion(row, along_y=True), 1)) for row in rows],
              "tip_mm": [list(row.command.target_mm[0]) for row in rows],
              **{f"touch{k}": [row.time_us[k] / 1e3 for row in rows] for k in range(3)}, "room": [21.5] * len(rows)}
     pq.write_table(pa.table(table), tmp_path / "log.parquet")
     import_recording(tmp_path / "log.parquet", tmp_path / "set.csv", {
         **_HEAD, "object": "part", "contact_time": {"fields": ["touch0", "touch1", "touch2"], "unit": "ms"},
         "standoff": {"value": 60, "unit": "mm"}, "speed": {"value": 0.02, "unit": "m/s"}, "covariates": {"room_degc": {"field": "room"}},
-        "pose": {"position": "tip_mm", "orientation": "q", "order": "wxyz", "is": "target", "approach_axis": "+z", "lateral_axis": "+x"}})
+        "pose": {"position": "tip_mm", "orientation": "q", "order": "wxyz", "is": "target", "approach_axis": "-y", "lateral_axis": "+z"}})
     found = _same(tmp_path / "set.csv", rows)
     assert found[0].command.covariates["cov_room_degc"][0] == 21.5
 
