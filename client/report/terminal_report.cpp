@@ -152,7 +152,10 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
 std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
   AddOpening(report, &out);
-  AddHowWrong(report, &out);
+  if (report.has_sessions())
+    AddSessions(report, &out);
+  else
+    AddHowWrong(report, &out);
   AddVersus(report, &out);
   AddDataProblems(report, &out);
   AddJoint(report, &out);

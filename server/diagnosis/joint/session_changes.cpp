@@ -141,10 +141,23 @@ class ChangeFinder {
     return false;
   }
 
+  // With the values that were chosen: a joint fit takes the smooth error that fits best where it starts.
+  engine::Parameterization StartOf(const Side& side, const std::vector<SharedEffect>& effects) const {
+    engine::Parameterization start = side.Free(effects, {});
+    const engine::Parameterization& known = evidence_->fit(side.kind).model;
+    const Eigen::VectorXd chosen = evidence_->PointOf(choice_->chosen(), side.kind);
+    Eigen::VectorXd point = start.Start();
+    for (int j = 0; j < start.size(); ++j)
+      for (int i = 0; i < known.size(); ++i)
+        if (IsSameValue(known, i, start, j)) point[j] = chosen[i];
+    start.MoveTo(start.Clip(point));
+    return start;
+  }
+
   absl::StatusOr<JointFit> FitWith(const std::vector<SharedEffect>& effects) const {
     std::vector<Part> parts;
     for (const Side& side : sides_)
-      parts.push_back({&side.modality->experiment(), side.Free(effects, {}),
+      parts.push_back({&side.modality->experiment(), StartOf(side, effects),
                        evidence_->variance_factor(side.kind)});
     return FitJointly(parts, [this](const engine::Parameterization& model, int parameter) {
       return IsOwn(model, parameter);

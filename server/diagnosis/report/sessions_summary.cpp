@@ -1,22 +1,17 @@
 // Several sessions in sentences.
+#include <algorithm>
+
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include <algorithm>
-#include <filesystem>
-
+#include "server/base/file_label.h"
 #include "server/diagnosis/report/summary.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr double kLeastP = 1e-300;
-
-std::string FileName(const std::string& path) {
-  const std::string name = std::filesystem::path(path).filename().string();
-  return name.empty() ? path : name;
-}
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
   return absl::StrCat(effect.effect, " ", value.name, value.entry.empty() ? "" : absl::StrCat(" ", value.entry),
@@ -66,10 +61,9 @@ std::string OthersInWords(const joint::SessionChanges& changes) {
 }  // namespace
 
 std::string SessionName(const std::vector<DataReport>& data, int session) {
-  const std::string name = FileName(data[session].session);
-  const auto same = std::count_if(data.begin(), data.end(),
-                                  [&](const DataReport& one) { return FileName(one.session) == name; });
-  return same > 1 ? data[session].session : name;
+  std::vector<std::string> paths;
+  for (const DataReport& one : data) paths.push_back(one.session);
+  return FileLabel(paths, session);
 }
 
 std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data) {
