@@ -1,5 +1,6 @@
 // Several sessions in the terminal: how wrong the model is in each, and which values changed.
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,8 +20,8 @@ constexpr int kMaxColumns = 3;  // sessions beside one another; of more, the two
 // Digits that the error leaves.
 std::string ValueWithError(double value, double std_error) {
   if (!(std_error > 0)) return Number(value, 3);
-  const double steps = std::pow(10, std::floor(std::log10(std_error)) - 1);
-  return absl::StrCat(Number(std::round(value / steps) * steps, 6), " +- ", Number(std_error, 2));
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std_error))), 0, 9);
+  return absl::StrFormat("%.*f +- %.*f", decimals, value, decimals, std_error);
 }
 
 std::string ChangeInWords(const v1::ComparedValue& value, double p) {

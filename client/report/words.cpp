@@ -212,7 +212,7 @@ const v1::DataReport& DataOf(const v1::Report& report, const v1::DataProblem& pr
 }
 
 bool IsJoint(const v1::Report& report) {
-  return report.data_size() > 1 &&
+  return report.data_size() > 1 && !report.has_sessions() &&
          std::all_of(report.data().begin(), report.data().end(),
                      [](const v1::DataReport& data) { return data.initial().rmse() > 0; });
 }

@@ -279,8 +279,8 @@ class SessionsReporter {
         }
       for (const joint::ComparedEffect& compared : changes().effects)
         if (compared.effect == found.effect && compared.values == joint::SessionValues::kOwn) {
-          engine::AddWords(absl::StrCat("changed between the sessions; the values are those of ",
-                                        Name(taking_part().back())),
+          engine::AddWords(absl::StrCat("Changed between the sessions: the values are those of ",
+                                        Name(taking_part().back()), "."),
                            &step);
           break;
         }

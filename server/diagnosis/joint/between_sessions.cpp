@@ -9,6 +9,17 @@ namespace {
 
 constexpr double kLimitDeviations = 3;  // Shewhart's limits
 
+// What other sessions let expect of one, and how far it lies from their mean, over the distance of the limits.
+std::pair<ControlLimits, double> LimitsFrom(const std::vector<SessionEstimate>& others,
+                                            const SessionEstimate& own) {
+  const BetweenSessions between = EstimateBetweenSessions(others);
+  const double distance =
+      kLimitDeviations *
+      std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
+  const double excess = std::abs(own.value - between.mean) / distance;
+  return {{between.mean - distance, between.mean + distance, excess > 1}, excess};
+}
+
 }  // namespace
 
 BetweenSessions EstimateBetweenSessions(const std::vector<SessionEstimate>& sessions) {
@@ -39,18 +50,32 @@ BetweenSessions EstimateBetweenSessions(const std::vector<SessionEstimate>& sess
   return between;
 }
 
-ControlLimits LimitsOfSession(const std::vector<SessionEstimate>& sessions, size_t session) {
-  std::vector<SessionEstimate> others = sessions;
-  others.erase(others.begin() + static_cast<long>(session));
-  const BetweenSessions between = EstimateBetweenSessions(others);
-  const SessionEstimate& own = sessions[session];
-  const double deviation =
-      std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
-  ControlLimits limits;
-  limits.lower = between.mean - kLimitDeviations * deviation;
-  limits.upper = between.mean + kLimitDeviations * deviation;
-  limits.outside = own.value < limits.lower || own.value > limits.upper;
-  return limits;
+ControlChart MakeControlChart(const std::vector<SessionEstimate>& sessions) {
+  ControlChart chart;
+  std::vector<char> inside(sessions.size(), 1);
+  const auto others = [&](size_t but) {
+    std::vector<SessionEstimate> list;
+    for (size_t i = 0; i < sessions.size(); ++i)
+      if (inside[i] && i != but) list.push_back(sessions[i]);
+    return list;
+  };
+  if (sessions.size() >= kMinForLimits) {
+    chart.limits.resize(sessions.size());
+    for (size_t left = sessions.size();; --left) {
+      size_t farthest = 0;
+      double most = 1;
+      for (size_t i = 0; i < sessions.size(); ++i) {
+        const auto [limits, excess] = LimitsFrom(others(i), sessions[i]);
+        chart.limits[i] = limits;
+        if (inside[i] && excess > most) farthest = i, most = excess;
+      }
+      // Of three no one can be told from the other two.
+      if (most <= 1 || left < kMinForLimits) break;
+      inside[farthest] = 0;
+    }
+  }
+  chart.inside = EstimateBetweenSessions(others(sessions.size()));
+  return chart;
 }
 
 }  // namespace touchstone::diagnosis::joint

@@ -17,13 +17,18 @@ struct BetweenSessions {
 };
 BetweenSessions EstimateBetweenSessions(const std::vector<SessionEstimate>& sessions);
 
-// What the other sessions let expect of one, three standard deviations to either side: of the scatter between them, of their
-// mean, and of the session's own value. At least kMinForLimits sessions in all.
-inline constexpr size_t kMinForLimits = 4;
+// What the other sessions let expect of each, three standard deviations to either side: of the scatter between them, of their
+// mean, and of the session's own value. A session outside is no evidence of the others' scatter: the one farthest outside is
+// set aside, then the next.
+inline constexpr size_t kMinForLimits = 4;  // sessions; of fewer there are no limits
 struct ControlLimits {
   double lower = 0, upper = 0;
   bool outside = false;  // the session's value
 };
-ControlLimits LimitsOfSession(const std::vector<SessionEstimate>& sessions, size_t session);
+struct ControlChart {
+  std::vector<ControlLimits> limits;  // by session; empty: there are too few
+  BetweenSessions inside;             // of the sessions that are not outside
+};
+ControlChart MakeControlChart(const std::vector<SessionEstimate>& sessions);
 
 }  // namespace touchstone::diagnosis::joint

@@ -31,21 +31,34 @@ TEST(BetweenSessions, IsTheVarianceBeyondTheStandardErrors) {
   EXPECT_NEAR(between.mean, 2, 1e-12);
 }
 
-TEST(ControlLimits, LeaveOneOfHundredSessionsOutsideAtMost) {
-  int outside = 0, all = 0;
-  for (uint64_t seed = 1; seed <= 50; ++seed) {
-    const std::vector<SessionEstimate> sessions = Drawn(20, 0.2, 0.1, seed);
-    for (size_t s = 0; s < sessions.size(); ++s) outside += LimitsOfSession(sessions, s).outside, ++all;
-  }
-  EXPECT_LE(outside, all / 100);
+int CountOutside(const std::vector<SessionEstimate>& sessions) {
+  int outside = 0;
+  for (const ControlLimits& limits : MakeControlChart(sessions).limits) outside += limits.outside;
+  return outside;
 }
 
-// The session itself must not widen its limits.
-TEST(ControlLimits, NameTheSessionThatMoved) {
+TEST(ControlChart, LeavesOneOfHundredSessionsOutsideAtMost) {
+  int outside = 0;
+  for (uint64_t seed = 1; seed <= 50; ++seed) outside += CountOutside(Drawn(20, 0.2, 0.1, seed));
+  EXPECT_LE(outside, 50 * 20 / 100);
+}
+
+// One session must widen neither its own limits nor the others'.
+TEST(ControlChart, NamesTheSessionThatMovedAndKeepsTheOthersLimits) {
   std::vector<SessionEstimate> sessions = Drawn(8, 0.02, 0.02, 3);
-  sessions[5].value += 0.3;
-  for (size_t s = 0; s < sessions.size(); ++s)
-    EXPECT_EQ(LimitsOfSession(sessions, s).outside, s == 5) << s;
+  const ControlChart steady = MakeControlChart(sessions);
+  sessions[5].value += 0.5;
+  const ControlChart chart = MakeControlChart(sessions);
+  for (size_t s = 0; s < sessions.size(); ++s) {
+    EXPECT_EQ(chart.limits[s].outside, s == 5) << s;
+    EXPECT_LT(chart.limits[s].upper - chart.limits[s].lower,
+              2 * (steady.limits[s].upper - steady.limits[s].lower));
+  }
+  EXPECT_LT(chart.inside.std_deviation, 0.05);
+}
+
+TEST(ControlChart, HasNoLimitsForThreeSessions) {
+  EXPECT_TRUE(MakeControlChart(Drawn(3, 0.2, 0.1, 1)).limits.empty());
 }
 
 }  // namespace

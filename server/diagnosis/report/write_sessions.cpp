@@ -43,14 +43,13 @@ void WriteBySession(const joint::ComparedValue& value, const std::vector<int>& t
     known.push_back({estimate.value, estimate.std_error});
     written.push_back(to);
   }
-  if (known.size() > 2)
-    message->set_between_sessions(joint::EstimateBetweenSessions(known).std_deviation);
-  if (known.size() < joint::kMinForLimits) return;
-  for (size_t i = 0; i < known.size(); ++i) {
-    const joint::ControlLimits limits = joint::LimitsOfSession(known, i);
-    written[i]->set_limit_lower(limits.lower);
-    written[i]->set_limit_upper(limits.upper);
-    written[i]->set_outside(limits.outside);
+  if (known.size() < 3) return;
+  const joint::ControlChart chart = joint::MakeControlChart(known);
+  message->set_between_sessions(chart.inside.std_deviation);
+  for (size_t i = 0; i < chart.limits.size(); ++i) {
+    written[i]->set_limit_lower(chart.limits[i].lower);
+    written[i]->set_limit_upper(chart.limits[i].upper);
+    written[i]->set_outside(chart.limits[i].outside);
   }
 }
 
