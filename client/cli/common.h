@@ -213,7 +213,7 @@ void AddSession(Cli* cli);
 void AddRig(Cli* cli);
 void AddToken(Cli* cli);
 void AddDoctor(Cli* cli);
-void AddPythonCommands(Cli* cli);  // export, import: the table is in python_command.cpp
+void AddPythonCommands(Cli* cli);  // export, import, worth: the table is in python_command.cpp
 void AddHelp(Cli* cli);            // help, version, completion
 
 }  // namespace touchstone::cli

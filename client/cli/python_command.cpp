@@ -54,6 +54,10 @@ const std::vector<PythonCommand>& PythonCommands() {
       {"import", "Makes a measurement set of another tool's file: MCAP, ROS 2 bag, LeRobot, Parquet.",
        "touchstone.formats", "import", "touchstone-sim[formats]",
        "--map --out -o --force --json --quiet -q --help -h"},
+      {"worth", "Says what a better model is worth to your recogniser, on measured touches, with intervals.",
+       "touchstone.training.worth", "", "touchstone-training",
+       "--model --better --train --fitted --mesh --mesh-dir --server --samples --touches --poses --seeds "
+       "--seed --figure --force --json --quiet -q --help -h"},
   };
   return commands;
 }

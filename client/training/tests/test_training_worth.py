@@ -2,6 +2,8 @@
 
 import json
 import math
+import pathlib
+import re
 import subprocess
 import sys
 
@@ -13,7 +15,7 @@ pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.trai
 import touchstone
 from touchstone.training import ladder
 from touchstone.training.touch_data import collect
-from touchstone.training.worth import FileError, Worth, worth
+from touchstone.training.worth import FileError, Worth, __main__ as command_line, worth
 from touchstone.training.worth.__main__ import main
 from touchstone.training.worth.intervals import Resampling, exchange
 
@@ -150,7 +152,7 @@ def test_a_set_that_does_not_do_is_refused_in_words(folder, client):
     (folder / "cup.csv").write_text("".join(lines).replace("lat10", "cup"))
     with pytest.raises(touchstone.InvalidRequest, match="touches of cup, which the source does not have"):
         ask(folder, client, "cup.csv")
-    (folder / "two.csv").write_text("".join([*lines[:-1], lines[-1].replace(",20,", ",40,", 1)]))
+    (folder / "two.csv").write_text("".join([*lines[:-1], lines[-1].replace(",20.0,", ",40.0,", 1)]))
     with pytest.raises(touchstone.InvalidRequest, match="touches at 20 and 40 mm/s"):
         ask(folder, client, "two.csv")
 
@@ -158,19 +160,32 @@ def test_a_set_that_does_not_do_is_refused_in_words(folder, client):
 def test_the_command_writes_what_the_function_gives(folder, client, found, capsys, tmp_path):
     asked = [str(folder / "set.csv"), "--model", str(folder / "nominal.yaml"), "--better", str(folder / "better.yaml"), "--train",
              str(folder / "bayes.py"), "--server", client.target, "--samples", "240", "--seeds", "3"]
-    assert main([*asked, "--json", str(tmp_path / "w.json"), "--figure", str(tmp_path / "w.svg")]) == 0
+    main([*asked, "--figure", str(tmp_path / "w.svg")])
     told = capsys.readouterr().out
     assert told.startswith("Worth it: ") and "+ finger_length" in told
-    assert json.loads((tmp_path / "w.json").read_text()) == json.loads(json.dumps(found.to_dict()))
     assert "<svg" in (tmp_path / "w.svg").read_text()
-    assert main([*asked, "--mesh", "cup=cup.off"]) == 1
-    assert "--mesh: works only without --server" in capsys.readouterr().err
+    main([*asked, "--json"])
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(found.to_dict()))
+    with pytest.raises(touchstone.InvalidRequest, match="--mesh: works only without --server"):
+        main([*asked, "--mesh", "cup=cup.off"])
+    (tmp_path / "w.svg").write_text("mine")
+    with pytest.raises(touchstone.InvalidRequest, match=r"w\.svg: exists already; --force replaces it"):
+        main([*asked, "--figure", str(tmp_path / "w.svg")])
+    assert (tmp_path / "w.svg").read_text() == "mine"
+
+
+def test_the_program_completes_the_options_of_the_module():
+    rows = (pathlib.Path(__file__).resolve().parents[2] / "cli/python_command.cpp").read_text(encoding="utf-8")
+    listed = re.search(r'"touchstone\.training\.worth", "", "touchstone-training",([^}]*)}', rows)
+    assert listed is not None
+    known = {name for action in command_line._parser()._actions for name in action.option_strings}
+    assert set(re.findall(r"--?[a-z-]+", listed[1])) == known
 
 
 def test_the_module_is_a_command_that_ends_without_a_traceback(folder):
     done = subprocess.run([sys.executable, "-m", "touchstone.training.worth", "no.csv", "--model", folder / "nominal.yaml", "--better",
                            folder / "better.yaml"], capture_output=True, text=True, check=False)
-    assert done.returncode == 1 and done.stderr == "touchstone worth: no.csv: No such file or directory.\n"
+    assert done.returncode == 2 and done.stderr == "touchstone: error: no.csv: No such file or directory.\n"
 
 
 # --- steps

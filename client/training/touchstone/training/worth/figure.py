@@ -39,5 +39,5 @@ def draw(worth: Worth, path: str | os.PathLike[str]) -> None:
         axes.annotate("chance", (1, 100 * chance), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=8, color="#7b8794")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.25), ncol=3, fontsize=8)
     target = pathlib.Path(path)
-    figure.savefig(target, format=target.suffix[1:] or "svg", metadata={"Date": None} if target.suffix in (".svg", "") else None)
+    figure.savefig(target, metadata={"Date": None} if target.suffix == ".svg" else None)
     plt.close(figure)
