@@ -10,6 +10,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
+#include "client/cli/child_program.h"
 #include "client/cli/common.h"
 #include "server/base/status.h"
 
@@ -91,6 +92,9 @@ absl::Status BecomePythonCommand(const PythonCommand& command, const std::vector
   std::vector<char*> raw;
   for (std::string& word : words) raw.push_back(word.data());
   raw.push_back(nullptr);
+  // A module that starts a server takes the one of this program.
+  const std::string server = PathBesideThisProgram("touchstone-server");
+  if (::access(server.c_str(), X_OK) == 0) ::setenv("TOUCHSTONE_SERVER", server.c_str(), /*replace=*/0);
   std::fflush(stdout);
   ::execv(raw[0], raw.data());
   return absl::NotFoundError(absl::StrCat(*python, " cannot be started: ", std::strerror(errno)));

@@ -57,8 +57,10 @@ def _parser() -> command.CommandParser:
     add("--train", metavar="FILE.py", help="The recogniser: fit(features, labels, seed), which returns an object with predict(features); "
         "features(times_us, speed_mm_s, spacing_mm) if it is to see something else than local curvatures. Default: XGBoost")
     add("--fitted", metavar="SET", help="What the better model was fitted to: none of its poses is tested")
-    add("--mesh", action="append", default=[], metavar="NAME=FILE", help="Mesh of an object, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x]; may be repeated")
-    add("--mesh-dir", action="append", default=[], metavar="FOLDER", help="Folder of mesh files that bear the names of objects; may be repeated")
+    add("--mesh", action="append", default=[], metavar="NAME=FILE",
+        help="Mesh of an object, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x]; may be repeated")
+    add("--mesh-dir", action="append", default=[], metavar="FOLDER",
+        help="Folder of mesh files that bear the names of objects; may be repeated")
     add("--server", default="", metavar="HOST:PORT", help="A touchstone-server. Default: one is started")
     add("--samples", type=_whole, default=960, metavar="N", help="Simulated touches of each object in training. Default: 960")
     add("--touches", type=_whole, default=8, metavar="N", help="Touches that the recogniser sees at once. Default: 8")

@@ -7,7 +7,7 @@ import os
 import pathlib
 import tempfile
 from collections.abc import Iterator, Sequence
-from typing import Any, Callable
+from typing import Callable
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..context import Context
 from ..features import FeatureSets, dealt_rows, of_rows
 from ..ladder import Rung
 from ..recognisers import Trained
+from ..result import Estimate
 from ..settings import Settings
 from ..touch_data import TouchData
 from . import measured, result
@@ -138,14 +139,15 @@ class _Experiment:
             raise touchstone.InvalidRequest(f"{name} has touches of {', '.join(unknown)}, which the source does not have; name the mesh "
                                             f"(--mesh {unknown[0]}=FILE) or a folder of meshes (--mesh-dir).")
 
-    def _rungs(self, nominal: str, better: str) -> tuple[list[Rung], list[Any], str]:
+    def _rungs(self, nominal: str, better: str) -> tuple[list[Rung], list[Estimate | None], str]:
         """The models, the change of the RMSE from each to the next, and what the touches are called."""
         client = self.context.simulator
         of_pictures = {each.name for each in client.effects() if each.stage in _STAGES_OF_PICTURES}
         found = ladder.between(*(ladder.without(model, of_pictures) for model in (nominal, better)))
         report = client.compare(self.set.path, found[0][1])
         touches = report.of("touches")
-        rungs, changes = [Rung(*found[0], report.rmse_us)], [None]
+        rungs = [Rung(*found[0], report.rmse_us)]
+        changes: list[Estimate | None] = [None]
         for k in range(1, len(found)):
             report = client.compare(self.set.path, found[k - 1][1], other_model=found[k][1])
             versus = report.versus
@@ -154,7 +156,7 @@ class _Experiment:
             changes.append(result.change_of_rmse(versus.rmse_difference, versus.interval))
         return rungs, changes, "emulated" if touches is not None and touches.emulated else "measured"
 
-    def _step(self, k: int, rungs: Sequence[Rung], changes: Sequence[Any], cells: Sequence[np.ndarray]) -> Step:
+    def _step(self, k: int, rungs: Sequence[Rung], changes: Sequence[Estimate | None], cells: Sequence[np.ndarray]) -> Step:
         accuracy = self.draws.estimate(cells[k])
         if k == 0:
             return Step(rungs[0], accuracy)
@@ -196,8 +198,9 @@ class _Experiment:
         sets, hand = asked.samples // asked.touches, {"speed_mm_s": data.speed_mm_s, "spacing_mm": data.spacing_mm}
         if asked.poses != "set":
             plan = None if asked.poses == "faces" else touchstone.sphere()
-            yield np.ones(len(self.groups.objects), bool), ladder.simulated_sets(self.context, rung.model, seed, sets, asked.touches, objects=data.objects,
-                                                     features=self.recogniser.features, plan=plan, **hand)
+            train = ladder.simulated_sets(self.context, rung.model, seed, sets, asked.touches, objects=data.objects,
+                                          features=self.recogniser.features, plan=plan, **hand)
+            yield np.ones(len(self.groups.objects), bool), train
             return
         fold = self._folds(seed)
         for number in range(fold.max() + 1):

@@ -26,8 +26,9 @@ def draw(worth: Worth, path: str | os.PathLike[str]) -> None:
         sizes, look = [size for size, _ in curve], figures.colour(("noisy", "virtual")[place])
         right.plot(sizes, [100 * each.value for _, each in curve], marker="os"[place], color=look, label=f"simulated, {name}")
         right.fill_between(sizes, [100 * each.low for _, each in curve], [100 * each.high for _, each in curve], color=look, alpha=0.2, linewidth=0)
-    right.errorbar([worth.own_touches], [100 * worth.own.value], [[100 * (worth.own.value - worth.own.low)], [100 * (worth.own.high - worth.own.value)]],
-                   marker="D", capsize=3, color=figures.colour("measured"), label=kind, linestyle="")
+    own = worth.own
+    right.errorbar([worth.own_touches], [100 * own.value], [[100 * (own.value - own.low)], [100 * (own.high - own.value)]], marker="D", capsize=3,
+                   color=figures.colour("measured"), label=kind, linestyle="")
     right.set(xscale="log", xlabel="touches in training", title="How many touches it takes")
     ticks = sorted({size for curve in worth.curves.values() for size, _ in curve})
     right.set_xticks(ticks, [f"{size:,}" for size in ticks], rotation=25, fontsize=8)
