@@ -55,10 +55,9 @@ class Tabular:
     def _repr_html_(self) -> str:
         columns = dict(_flat(self._table()))
         rows = min((len(values) for values in columns.values()), default=0)
-        line = lambda tag, cells: "<tr>" + "".join(f"<{tag}>{_escaped(cell)}</{tag}>" for cell in cells) + "</tr>"
-        body = [line("td", [_cell(values[k]) for values in columns.values()]) for k in range(min(rows, SHOWN_ROWS))]
+        body = [_line("td", [_cell(values[k]) for values in columns.values()]) for k in range(min(rows, SHOWN_ROWS))]
         more = f"<p>{rows - SHOWN_ROWS:,} more rows</p>" if rows > SHOWN_ROWS else ""
-        return f"<p>{_escaped(self._heading())}</p><table>{line('th', columns)}{''.join(body)}</table>{more}"
+        return f"<p>{_escaped(self._heading())}</p><table>{_line('th', columns)}{''.join(body)}</table>{more}"
 
 
 _Row = TypeVar("_Row")
@@ -71,6 +70,10 @@ class Rows(tuple[_Row, ...], Tabular):
 
     def _table(self) -> Mapping[str, Any]:
         return columns_of(self)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(map(repr, self[:3]))
+        return printable(f"({shown}{f', ... {len(self) - 3} more' if len(self) > 3 else ',' if len(self) == 1 else ''})")
 
     def _heading(self) -> str:
         return f"{len(self)} {type(self[0]).__name__ if self else 'entries'}"
@@ -131,8 +134,9 @@ def _flat(columns: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
         elif values.ndim > 3 or values[0:1].size > 64:
             yield name, list(values)
         else:
-            for place in np.ndindex(values.shape[1:]):
-                yield "_".join(map(str, (name, *place))), values[(slice(None), *place)]
+            flat = values.reshape(len(values), -1)
+            for k, place in enumerate(np.ndindex(values.shape[1:])):
+                yield "_".join(map(str, (name, *place))), flat[:, k]
 
 
 def _arrow_array(arrow: Any, values: Any) -> Any:
@@ -142,6 +146,10 @@ def _arrow_array(arrow: Any, values: Any) -> Any:
     for size in reversed(values.shape[1:]):
         found = arrow.FixedSizeListArray.from_arrays(found, size)
     return found
+
+
+def _line(tag: str, cells: Iterable[str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{_escaped(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
 def _cell(value: Any) -> str:

@@ -41,9 +41,10 @@ def _writable(values: NDArray[Any]) -> NDArray[Any]:
     Those of up to one byte are Python's own, shared by everybody, and are copied."""
     if values.nbytes < 2 or not values.flags.c_contiguous:
         return values.copy()
-    memory = (ctypes.c_char * values.nbytes).from_address(values.ctypes.data)
+    memory: Any = (ctypes.c_char * values.nbytes).from_address(values.ctypes.data)
     memory.owner = values  # which lives as long as the tensor
-    return np.frombuffer(memory, values.dtype).reshape(values.shape)
+    shared: NDArray[Any] = np.frombuffer(memory, values.dtype).reshape(values.shape)
+    return shared
 
 
 def rows(batch: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -105,6 +105,14 @@ def test_a_measured_touch_is_worth_more_of_the_worse_model(found):
     assert found.own_touches < found.about["touches"]
 
 
+def test_it_is_a_table_and_a_figure(found):
+    table = found._table()
+    assert table["trained_on"] == ["nominal", "+ tool_tilt", "+ finger_length", "measured touches"]
+    assert table["accuracy"][-1] == found.own.value and table["gain"][0] is None and table["gain_low"][2] == found.steps[2].gain.low
+    assert "Caution" in found._repr_html_() and found._repr_html_().count("<tr>") == 5
+    assert found.plot().get_xlabel() == "trained on"
+
+
 def test_what_the_better_model_was_fitted_to_is_not_tested(folder, client):
     lines = (folder / "set.csv").read_text().splitlines(keepends=True)
     (folder / "fitted.csv").write_text("".join([lines[0], *lines[1:84]]))

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from touchstone.tabular import Tabular
+
 from .. import ladder_words
 from ..ladder import Rung
 from ..result import Estimate, Table
@@ -21,7 +23,7 @@ FEW_GROUPS = 20  # of poses: with fewer, intervals by bootstrap are too narrow
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """What training on one model gives.
+    """What training on one model gives. All estimates with their 95 % intervals.
 
     Attributes:
       rung: the model.
@@ -54,8 +56,9 @@ class Step:
 
 
 @dataclasses.dataclass(frozen=True)
-class Worth:
-    """What a better model is worth to a recogniser, on measured touches. print() says it.
+class Worth(Tabular):
+    """What a better model is worth to a recogniser, on measured touches. print() says it; a table of accuracies in notebooks, with
+    to_pandas(), to_arrow() and plot().
 
     Attributes:
       steps: the nominal model, each step between, the better model.
@@ -86,6 +89,21 @@ class Worth:
                 for each in self.steps]
         rows.append([f"{self.own_touches:,} {self.about['kind']} touches", "", self.own.words(), ""])
         return Table("", ["trained on", "RMSE, ms", f"knows of {self.about['kind']} sets", "against the nominal"], rows)
+
+    def _table(self) -> dict[str, Any]:
+        rows: list[Any] = [(_name(each), each.rung.rmse_us, each.accuracy, each.gain) for each in self.steps]
+        rows.append((f"{self.about['kind']} touches", None, self.own, None))
+        bounds = lambda of: [[getattr(row[of], end) if row[of] else None for row in rows] for end in ("value", "low", "high")]
+        names = ("accuracy", "accuracy_low", "accuracy_high", "gain", "gain_low", "gain_high")
+        return {"trained_on": [row[0] for row in rows], "rmse_us": [row[1] for row in rows], **dict(zip(names, bounds(2) + bounds(3)))}
+
+    def _heading(self) -> str:
+        return " ".join([self.words[0], *self.cautions])
+
+    def _draw(self, axes: Any) -> None:
+        from .figure import draw_steps
+
+        draw_steps(self, axes)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types, as `--json` writes them; what is infinite or unknown is None."""
