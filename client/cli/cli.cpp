@@ -94,6 +94,36 @@ CLI::App* Cli::AddCommand(CLI::App* parent, const std::string& name, const std::
   return command;
 }
 
+CLI::App* Cli::AddForwarded(const std::string& name, const std::string& description,
+                            std::vector<std::string> options,
+                            std::function<absl::Status(const std::vector<std::string>&)> run) {
+  CLI::App* command = app_.add_subcommand(name, description);
+  command->group("Commands");
+  command->set_help_flag();
+  command->prefix_command();
+  forwarded_[command] = {std::move(options), std::move(run)};
+  return command;
+}
+
+bool Cli::Forward(const CLI::App* command, const std::vector<std::string>& arguments,
+                  absl::Status* status) const {
+  const auto forwarded = forwarded_.find(command);
+  if (forwarded == forwarded_.end()) return false;
+  *status = forwarded->second.run(arguments);
+  return true;
+}
+
+std::vector<std::string> Cli::OptionsOf(const CLI::App* command) const {
+  const auto forwarded = forwarded_.find(command);
+  if (forwarded != forwarded_.end()) return forwarded->second.options;
+  std::vector<std::string> options;
+  for (const CLI::Option* option : command->get_options()) {
+    for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) options.push_back("-" + name);
+  }
+  return options;
+}
+
 CLI::App* Cli::AddGroup(const std::string& name, const std::string& description,
                         const std::string& examples) {
   CLI::App* group = app_.add_subcommand(name, description);
@@ -266,6 +296,12 @@ int Cli::Run(int argc, char** argv) {
   const CLI::App* app = &app_;
   while (!app->get_subcommands().empty()) app = app->get_subcommands()[0];
   const auto run = runs_.find(app);
+  const auto name = std::find(arguments_.begin(), arguments_.end(), app->get_name());
+  absl::Status status;
+  if (name != arguments_.end() && Forward(app, {name + 1, arguments_.end()}, &status)) {
+    PrintError(status.message());
+    return ExitCodeOf(status);
+  }
   if (run == runs_.end()) {
     // "touchstone" or "touchstone model" alone: what there is, but not as a success.
     std::fprintf(stderr, "%s", app_.help().c_str());
@@ -274,7 +310,7 @@ int Cli::Run(int argc, char** argv) {
   // "rig-run": who holds a lease or stops a source is told with it.
   client::SetHolderProgram(
       absl::StrReplaceAll(HelpCommand().substr(std::strlen("touchstone ")), {{" ", "-"}}));
-  absl::Status status = CheckFiles(app);
+  status = CheckFiles(app);
   if (status.ok()) status = run->second();
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
     if (status.ok()) status = absl::ResourceExhaustedError("stdout: the output could not be written whole");

@@ -48,6 +48,14 @@ class Cli {
   // A command under `parent` (null: touchstone itself). Examples stand first in its help, one per line.
   CLI::App* AddCommand(CLI::App* parent, const std::string& name, const std::string& description,
                        const std::string& examples, std::function<absl::Status()> run);
+  // A command of another program: `run` is given every word behind its name, help and options too. `options` are for
+  // completion alone.
+  CLI::App* AddForwarded(const std::string& name, const std::string& description,
+                         std::vector<std::string> options,
+                         std::function<absl::Status(const std::vector<std::string>&)> run);
+  // Runs a command of another program, or nothing if it is none: then false.
+  bool Forward(const CLI::App* command, const std::vector<std::string>& arguments,
+               absl::Status* status) const;
   // A command that only holds others ("model").
   CLI::App* AddGroup(const std::string& name, const std::string& description, const std::string& examples);
 
@@ -83,6 +91,8 @@ class Cli {
       std::vector<source::MeshSpec> meshes) const;
   // All commands with their options.
   const CLI::App& app() const { return app_; }
+  // Names of the options that a command takes, "--out" and "-o".
+  std::vector<std::string> OptionsOf(const CLI::App* command) const;
   const SourceOptions& source() const { return source_; }
   // What --renderer and --egl-device say; INVALID_ARGUMENT for an unknown kind.
   absl::StatusOr<image::RendererOptions> Renderer() const;
@@ -110,6 +120,10 @@ class Cli {
     std::vector<Output> outputs;
     std::vector<const CLI::Option*> inputs;
   };
+  struct ForwardedCommand {
+    std::vector<std::string> options;
+    std::function<absl::Status(const std::vector<std::string>&)> run;
+  };
   absl::Status CheckFiles(const CLI::App* command);
   CLI::Option* AddOutputOf(CLI::App* command, const std::string& name, std::string* path,
                            const std::string& text, OutputKind kind, bool json_is_a_format);
@@ -123,6 +137,7 @@ class Cli {
   OutputOptions output_;
   SourceOptions source_;
   std::map<const CLI::App*, std::function<absl::Status()>> runs_;
+  std::map<const CLI::App*, ForwardedCommand> forwarded_;
   std::map<const CLI::App*, CommandFiles> files_;
   std::string command_line_;
   std::vector<std::string> arguments_;
@@ -199,6 +214,7 @@ void AddSession(Cli* cli);
 void AddRig(Cli* cli);
 void AddToken(Cli* cli);
 void AddDoctor(Cli* cli);
-void AddHelp(Cli* cli);  // help, version, completion
+void AddPythonCommands(Cli* cli);  // export, import, worth: the table is in python_command.cpp
+void AddHelp(Cli* cli);            // help, version, completion
 
 }  // namespace touchstone::cli

@@ -9,24 +9,20 @@ namespace touchstone::cli {
 namespace {
 
 // One case per command: `path` is " rig run", and nothing for touchstone itself.
-void AppendCases(const CLI::App& app, const std::string& path, std::string* cases) {
-  std::vector<std::string> commands, options;
+void AppendCases(const Cli& cli, const CLI::App& app, const std::string& path, std::string* cases) {
+  std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
-    for (const std::string& name : option->get_snames()) options.push_back("-" + name);
-  }
   absl::StrAppend(cases, "    '", path, "') commands='", absl::StrJoin(commands, " "), "' options='",
-                  absl::StrJoin(options, " "), "' ;;\n");
+                  absl::StrJoin(cli.OptionsOf(&app), " "), "' ;;\n");
   for (const CLI::App* command : app.get_subcommands({}))
-    AppendCases(*command, absl::StrCat(path, " ", command->get_name()), cases);
+    AppendCases(cli, *command, absl::StrCat(path, " ", command->get_name()), cases);
 }
 
 }  // namespace
 
-std::string CompletionScript(const CLI::App& root, bool zsh) {
+std::string CompletionScript(const Cli& cli, bool zsh) {
   std::string cases;
-  AppendCases(root, "", &cases);
+  AppendCases(cli, cli.app(), "", &cases);
   return absl::StrCat(zsh ? "autoload -U +X bashcompinit && bashcompinit\n" : "",
                       R"(_touchstone_words() {
   commands='' options=''

@@ -3,11 +3,11 @@
 
 #include <string>
 
-#include <CLI/CLI.hpp>
+#include "client/cli/common.h"
 
 namespace touchstone::cli {
 
 // For bash; with `zsh` after what lets zsh read it (bashcompinit). Completes commands, options, and files elsewhere.
-std::string CompletionScript(const CLI::App& root, bool zsh);
+std::string CompletionScript(const Cli& cli, bool zsh);
 
 }  // namespace touchstone::cli

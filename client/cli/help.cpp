@@ -13,8 +13,8 @@ namespace touchstone::cli {
 namespace {
 
 // Of "rig run": that of the command below the one above it.
-absl::StatusOr<std::string> HelpOf(const CLI::App& root, const std::vector<std::string>& words) {
-  const CLI::App* app = &root;
+absl::StatusOr<std::string> HelpOf(const Cli& cli, const std::vector<std::string>& words) {
+  const CLI::App* app = &cli.app();
   std::string above;
   for (const std::string& word : words) {
     std::vector<std::string> known;
@@ -30,6 +30,8 @@ absl::StatusOr<std::string> HelpOf(const CLI::App& root, const std::vector<std::
                         : absl::StrCat("unknown command '", word, "'", DidYouMean(word, known)));
     app = next;
   }
+  absl::Status status;
+  if (cli.Forward(app, {"--help"}, &status)) return status;
   // App::help() would be that of the command that runs.
   return app->get_formatter()->make_help(app, absl::StrCat(above, above.empty() ? "" : " ", app->get_name()),
                                          CLI::AppFormatMode::Normal);
@@ -42,7 +44,7 @@ void AddHelp(Cli* cli) {
   CLI::App* help =
       cli->AddCommand(nullptr, "help", "Prints the help of a command, or of all.",
                       "touchstone help\ntouchstone help rig run", [cli, words]() -> absl::Status {
-                        const absl::StatusOr<std::string> text = HelpOf(cli->app(), *words);
+                        const absl::StatusOr<std::string> text = HelpOf(*cli, *words);
                         return text.ok() ? cli->Print(*text) : text.status();
                       });
   help->add_option("COMMAND", *words, "Its name, word by word");
@@ -56,7 +58,7 @@ void AddHelp(Cli* cli) {
                       [cli, shell]() -> absl::Status {
                         if (const auto known = OneOf("SHELL", *shell, {"bash", "zsh"}); !known.ok())
                           return known.status();
-                        return cli->Print(CompletionScript(cli->app(), *shell == "zsh"));
+                        return cli->Print(CompletionScript(*cli, *shell == "zsh"));
                       });
   completion->add_option("SHELL", *shell, "bash or zsh")->required();
 }

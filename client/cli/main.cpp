@@ -34,6 +34,7 @@ void AddCommands(Cli* cli) {
   AddSession(cli);
   AddRig(cli);
   AddToken(cli);
+  AddPythonCommands(cli);
   AddDoctor(cli);
   AddHelp(cli);
 }

@@ -38,7 +38,7 @@ def wheel(tmp_path_factory):
     programs = folder / "programs"
     (programs / "bin").mkdir(parents=True)
     for name in PROGRAMS:
-        (programs / "bin" / name).write_text(f'#!/bin/sh\necho "{name}:" "$@"\n')
+        (programs / "bin" / name).write_text(f'#!/bin/sh\n[ "$1" != --python ] || exec echo "$TOUCHSTONE_PYTHON"\necho "{name}:" "$@"\n')
         (programs / "bin" / name).chmod(0o755)
     shutil.copytree(ROOT / "meshes", programs / "share/touchstone/meshes")
     return build(copy_of_the_sources(folder), folder / "out", "--no-build-isolation", "--no-index", TOUCHSTONE_PROGRAMS=str(programs))
@@ -76,6 +76,10 @@ def test_it_is_of_one_system_and_every_python(wheel):
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_command_becomes_the_program_of_its_name(installed, name):
     assert run_there(installed, installed / "bin" / name, "a b", "--flag") == f"{name}: a b --flag\n"
+
+
+def test_commands_in_python_run_where_the_wheel_lies(installed):
+    assert run_there(installed, installed / "bin/touchstone", "--python") == f"{sys.executable}\n"
 
 
 def test_own_server_is_that_of_the_wheel(installed):

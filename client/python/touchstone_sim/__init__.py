@@ -15,6 +15,8 @@ PROGRAMS = pathlib.Path(__file__).parent / "bin"
 
 def _become(name: str) -> None:
     program = PROGRAMS / name
+    # Commands that are Python modules run where the wheel lies (client/cli/python_command.cpp).
+    os.environ.setdefault("TOUCHSTONE_PYTHON", sys.executable)
     os.execv(program, [str(program), *sys.argv[1:]])
 
 

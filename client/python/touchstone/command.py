@@ -1,0 +1,134 @@
+"""Commands of `touchstone` that are Python modules: their options, their help, how they end. The program hands a command on
+to its module (client/cli/python_command.cpp), and `python -m MODULE` runs the same.
+
+    def main(words: list[str]) -> None:
+        parser = CommandParser("worth", "What a photograph is worth, in touches.", "touchstone worth set.csv --model m.yaml")
+        ...
+    if __name__ == "__main__":
+        command.run(main)
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import shutil
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from .errors import InvalidRequest, NotFound, SourceUnreachable, TouchstoneError
+from .printable import printable
+
+# As client/cli/exit_code.h.
+BAD_INPUT, UNREACHABLE, REFUSED, INTERRUPTED = 2, 3, 4, 130
+
+
+class _ExamplesFirst(argparse.HelpFormatter):
+    """The layout of the help of every command: what it is, examples, usage, arguments, options."""
+
+    def __init__(self, prog: str):
+        # As wide as the texts of the other commands: from 60 to 110 columns.
+        super().__init__(prog, max_help_position=32, width=min(110, max(60, shutil.get_terminal_size((110, 24)).columns)))
+
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        if not action.option_strings:
+            return super()._format_action_invocation(action)
+        if action.nargs == 0:
+            return ",".join(action.option_strings)
+        required = " (required)" if action.required else ""
+        return f"{','.join(action.option_strings)} {self._format_args(action, action.dest.upper())}{required}"
+
+    def add_usage(self, usage: str | None, actions: Any, groups: Any, prefix: str | None = None) -> None:
+        names = [f"{action.metavar or action.dest.upper()}{'...' if action.nargs in ('*', '+') else ''}"
+                 for action in actions if not action.option_strings]
+        super().add_usage(" ".join([self._prog, "[OPTIONS]", *names]), actions, groups, "Usage: ")
+
+
+class CommandParser(argparse.ArgumentParser):
+    """A parser whose help and errors are those of the other commands; `examples`: one per line."""
+
+    def __init__(self, name: str, description: str, examples: str):
+        super().__init__(prog=f"touchstone {name}", description=description, formatter_class=_ExamplesFirst, allow_abbrev=False,
+                         add_help=False)
+        self._examples = "".join(f"  {line}\n" for line in examples.split("\n"))
+        self._positionals.title, self._optionals.title = "Arguments", "Options"
+        self._output = self.add_argument_group("Output")
+        self._output.add_argument("-h", "--help", action="help", help="This text")
+
+    def add_output_options(self, *, force: bool = False) -> None:
+        """--json and --quiet, and --force for a command that writes a file."""
+        if force:
+            self._output.add_argument("--force", action="store_true", help="Replace output files that exist")
+        self._output.add_argument("--json", action="store_true", help="Machine-readable output; the names of numbers end in their unit")
+        self._output.add_argument("-q", "--quiet", action="store_true", help="Nothing but errors on stderr")
+
+    def format_help(self) -> str:
+        described = self._get_formatter()
+        described.add_text(self.description)
+        rest = self._get_formatter()
+        rest.add_usage(None, self._actions, self._mutually_exclusive_groups)
+        for group in self._action_groups:
+            rest.start_section(group.title)
+            rest.add_arguments(group._group_actions)
+            rest.end_section()
+        return f"{described.format_help()}\nExamples:\n{self._examples}\n{rest.format_help()}"
+
+    def parse(self, words: list[str]) -> argparse.Namespace:
+        options, left = self.parse_known_args(words)
+        if left:
+            unknown = [word for word in left if word.startswith("-")]
+            if not unknown:
+                self.error(f"'{left[0]}' is one argument too many")
+            known = [name for action in self._actions for name in action.option_strings]
+            self.error(f"unknown option '{unknown[0].partition('=')[0]}'{did_you_mean(unknown[0].partition('=')[0], known)}")
+        return options
+
+    def error(self, message: str) -> NoReturn:
+        # argparse's own words, as those of the other commands.
+        message = message.removeprefix("argument ")
+        missing = message.removeprefix("the following arguments are required: ")
+        _complain(f"{message if missing == message else missing + ' is required'} (see {self.prog} --help)")
+        sys.exit(BAD_INPUT)
+
+
+def did_you_mean(word: str, known: list[str]) -> str:
+    """", did you mean 'parquet'?", or what is known where nothing is near."""
+    near = difflib.get_close_matches(word, known, 1, 0.6)
+    return f", did you mean '{near[0]}'?" if near else f"; known: {', '.join(known)}"
+
+
+def log(quiet: bool, line: str) -> None:
+    """A line for people, on stderr."""
+    if not quiet:
+        print(printable(line), file=sys.stderr)
+
+
+def _complain(message: str) -> None:
+    sys.stdout.flush()
+    print(f"touchstone: error: {printable(message)}", file=sys.stderr)
+
+
+def run(main: Callable[[list[str]], None]) -> NoReturn:
+    """Calls `main` with the words behind the program, and ends the process as every command ends: 0 done, 2 usage or bad input,
+    3 source unreachable, 4 refused or failed, 130 interrupted."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        main(sys.argv[1:])
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        # Who read the output has enough of it; nothing is to be flushed at the end.
+        sys.stderr.close()
+        sys.exit(REFUSED)
+    except TouchstoneError as error:
+        _complain(str(error))
+        sys.exit(BAD_INPUT if isinstance(error, (InvalidRequest, NotFound)) else
+                 UNREACHABLE if isinstance(error, SourceUnreachable) else REFUSED)
+    except OSError as error:
+        _complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        sys.exit(BAD_INPUT if isinstance(error, (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError))
+                 else REFUSED)
+    sys.exit(0)
