@@ -36,7 +36,7 @@ from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
 from .report import Report
-from .report_parts import DataReport, Detectable, Explanation, Quality, Step, Value, Versus
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id
@@ -44,10 +44,10 @@ from .tabular import Rows, Tabular
 from .version import __version__
 
 __all__ = [
-    "Batch", "Camera", "Client", "Columns", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
+    "Batch", "Camera", "Client", "Columns", "ComparedValue", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
     "EncodedImages", "Explanation", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
     "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Rows", "Samples",
-    "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "Tabular", "TouchCheck", "Touches",
+    "Session", "Sessions", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "Tabular", "TouchCheck", "Touches",
     "TouchstoneError", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",
     "sphere", "touch_id", "touches", "write_measurements",
 ]

@@ -15,7 +15,7 @@ from .errors import InvalidRequest
 from .measurements import Row
 from .plans import Touches
 from .printable import printable
-from .report_parts import DataReport, Detectable, Explanation, Quality, Step, Value, Versus
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
 from .tabular import Rows, Tabular
 from .v1 import diagnosis_pb2
 from .whole_file import whole_file
@@ -148,6 +148,15 @@ class Report(Tabular):
                 return Versus(v.words, _quality(v.other), v.rmse_difference, (v.lower, v.upper), v.other_better, v)
         return None
 
+    @property
+    def sessions(self) -> Sessions | None:
+        """Of several sessions."""
+        if not self.message.HasField("sessions"):
+            return None
+        s = self.message.sessions
+        values = Rows(_compared(effect, value) for effect in s.effects for value in effect.values)
+        return Sessions(s.words, values, {place: text for place, text in enumerate(s.model_yaml) if text}, s)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them; without the table of touches,
         which is for a page and stays in `message`."""
@@ -234,6 +243,15 @@ def _detectable(d: diagnosis_pb2.DetectableEffect) -> Detectable:
         d.effect, " ".join(part for part in (d.parameter, d.finger) if part), d.stage, d.std_error, d.typical,
         d.power_at_typical, d.found_from if d.HasField("found_from") else None, d.rival, d.correlation,
         d.told_from if d.HasField("told_from") else None, d.parted_by,
+    )
+
+
+def _compared(effect: diagnosis_pb2.ComparedEffect, value: diagnosis_pb2.ComparedValue) -> ComparedValue:
+    return ComparedValue(
+        effect.effect, " ".join(part for part in (value.name, value.finger) if part), effect.object,
+        diagnosis_pb2.ComparedEffect.Change.Name(value.change).lower(), effect.p, value.difference,
+        (value.lower, value.upper), {one.session: (one.value, one.std_error) for one in value.sessions},
+        value.between_sessions, tuple(one.session for one in value.sessions if one.outside),
     )
 
 

@@ -199,3 +199,54 @@ class Versus(Tabular):
     def _draw(self, axes: Any) -> None:
         tabular.intervals(axes, ["the other model"], [self.rmse_difference], [self.interval])
         axes.set(xlabel="RMSE less that of the given model; below 0 the other errs less")
+
+
+@dataclasses.dataclass(frozen=True)
+class ComparedValue:
+    """One value of the model in every session. report.sessions.values has to_pandas(), to_arrow() and plot().
+
+    Attributes:
+      effect, name, object: "tip_radius", "radius_mm" (with its axis or finger), and the object of values that differ by object.
+      change: "unchanged" (the interval holds no change that would move a contact time by more than its noise), "changed" or
+        "cannot_say".
+      p: of sessions that differ so much by chance, over all effects.
+      difference, interval: of the two sessions that differ most, the later one's value less the earlier one's; of 95 %.
+      by_session: {place in report.data: (value, standard error)}.
+      between_sessions: standard deviation between sessions beyond the standard errors, of three or more; else 0.
+      outside: places of the sessions outside the limits that the others let expect.
+    """
+
+    effect: str
+    name: str
+    object: str
+    change: str
+    p: float
+    difference: float
+    interval: tuple[float, float]
+    by_session: dict[int, tuple[float, float]]
+    between_sessions: float
+    outside: tuple[int, ...]
+
+    @staticmethod
+    def _draw_all(rows: Sequence[ComparedValue], axes: Any) -> None:
+        tabular.intervals(axes, [f"{row.effect} {row.name} {row.object}".rstrip() for row in rows],
+                          [row.difference for row in rows], [row.interval for row in rows])
+        axes.axvline(0, color="0.5", linestyle=":", linewidth=1)
+        axes.set(xlabel="change between the sessions that differ most, with its 95 % interval")
+
+
+@dataclasses.dataclass(frozen=True)
+class Sessions:
+    """What several sessions of one rig share, and what changed between them.
+
+    Attributes:
+      words: what changed, in sentences.
+      values: every value of the model, in every session.
+      models: {place in report.data: the session's model file}; of sessions with enough touches, none of compare().
+      message: all of it, touchstone.v1.SessionComparison, with the poses that sessions share (same_poses).
+    """
+
+    words: str
+    values: tabular.Rows[ComparedValue]
+    models: dict[int, str]
+    message: diagnosis_pb2.SessionComparison = dataclasses.field(repr=False)
