@@ -71,6 +71,9 @@ TEST_F(PythonCommandTest, ItIsListedSuggestedAndCompleted) {
 
 TEST_F(PythonCommandTest, InterruptionEndsTheModule) {
   Module("import signal\nopen('started', 'w').close()\nwhile True:\n    signal.pause()\n");
+  ::signal(
+      SIGINT,
+      SIG_DFL);  // which tests that a shell runs in the background would ignore, and the module with them
   for (const int signal : {SIGINT, SIGTERM}) {
     std::filesystem::remove(Path("started"));
     const pid_t child = Start({"export"});

@@ -129,6 +129,23 @@ def test_the_same_seed_gives_the_same_answer(folder, client, found):
     assert ask(folder, client).to_dict() == found.to_dict()
 
 
+@pytest.mark.second_tier("statistical: 60 sets, each asked anew")
+def test_intervals_of_the_gain_hold_what_a_large_set_says(folder, client, tmp_path):
+    slight = ladder.NOMINAL + "  - finger_length: {offset_mm: [-0.15, 0.3, -0.15]}\n"
+    (tmp_path / "slight.yaml").write_text(slight)
+
+    def ask_of(per_face, poses, **how):
+        plan = touchstone.faces(samples_per_face=per_face, rounds=1)
+        ladder.write_set(collect(client, OBJECTS, plan, 18 * per_face, model=slight, seed=poses), tmp_path / "set.csv")
+        return ask(folder, client, tmp_path / "set.csv", tmp_path / "slight.yaml", **how).steps[-1].gain
+
+    truth = ask_of(400, 12345, seeds=30)
+    found = [ask_of(14, 1000 + k, seeds=5, seed=100 + 10 * k) for k in range(60)]
+    # Of 60 at 95 % fewer than 52 would come once in 300 times.
+    assert sum(each.low <= truth.value <= each.high for each in found) >= 52
+    assert np.mean([each.low > 0 for each in found]) > 0.9
+
+
 # --- mistakes
 
 
