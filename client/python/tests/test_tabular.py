@@ -1,8 +1,10 @@
 """Results as tables, figures and tensors: what stands in them is what the results say, and what is missing is named."""
 
+import dataclasses
 import importlib
 import re
 import types
+from typing import Any
 
 import numpy as np
 import pytest
@@ -112,6 +114,16 @@ def test_what_is_not_installed_is_named_with_the_way_to_get_it(monkeypatch, meth
     monkeypatch.setattr(tabular, "importlib", types.SimpleNamespace(import_module=absent))
     with pytest.raises(ModuleNotFoundError, match=rf"{method}\(\) needs {module}, which is not installed: pip install {module}"):
         getattr(touchstone.Rows([report_parts.Step("a", (), 0.5, (), "", ())]), method)()
+
+
+def test_values_of_several_sessions_are_a_table_too():
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed; to_arrow() needs it.")
+    by_session = {0: (1.5, 0.1), 2: (1.7, 0.2)}
+    fields: dict[str, Any] = dict.fromkeys((field.name for field in dataclasses.fields(report_parts.ComparedValue)), "x")
+    value = report_parts.ComparedValue(**{**fields, "by_session": by_session, "interval": (0.1, 0.3)})
+    table = touchstone.Rows([value, value]).to_arrow()
+    assert table.column("by_session").to_pylist()[1] == {"0": [1.5, 0.1], "2": [1.7, 0.2]}
+    assert table.column("interval").to_pylist()[0] == [0.1, 0.3]
 
 
 def test_columns_of_several_numbers_become_columns_each(results):

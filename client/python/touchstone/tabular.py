@@ -113,6 +113,8 @@ def _plain(value: Any) -> Any:
         return ", ".join(value)
     if isinstance(value, (tuple, list)) and value and all(dataclasses.is_dataclass(part) for part in value):
         return ", ".join(f"{part.name} = {part.value:.6g}" if hasattr(part, "value") else str(part) for part in value)
+    if isinstance(value, dict):
+        return {str(key): list(part) if isinstance(part, tuple) else part for key, part in value.items()}  # as Arrow wants it
     return value
 
 
