@@ -9,15 +9,13 @@ absl::Status RunCompare(const Cli& cli, const ComparisonOptions& options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CompareRequest request;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                *request.mutable_further() = {comparison->further().begin(),
-                                                              comparison->further().end()};
-                                if (comparison->other_model())
-                                  *request.mutable_other_model() = *comparison->other_model();
-                                return comparison->connection().diagnosis().Compare(context, request);
-                              }));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::Report report, comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+        if (comparison->other_model()) *request.mutable_other_model() = *comparison->other_model();
+        return comparison->connection().diagnosis().Compare(context, request);
+      }));
   return PrintReport(cli, options, report);
 }
 

@@ -243,17 +243,18 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
     return option;
   };
   if (options->takes_sets) {
-  CLI::Option* set = add_input(
-      options->set_name, options->sets, "",
-      !options->set_text.empty()
-          ? options->set_text
-          : absl::StrCat("The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG "
-                         "files; with a touches.csv in it `compare` and `diagnose` take both), or the journal "
-                         "(.db) of a rig's session; -: stdin; with --server also a stored session's name",
-                         options->max_sets > 1 ? ". Of touches, several: sessions of one rig, in the order "
-                                                 "in which they were made"
-                                               : ""));
-  set->required(options->set_required)->expected(options->set_required ? 1 : 0, options->max_sets);
+    CLI::Option* set = add_input(
+        options->set_name, options->sets, "",
+        !options->set_text.empty()
+            ? options->set_text
+            : absl::StrCat(
+                  "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG "
+                  "files; with a touches.csv in it `compare` and `diagnose` take both), or the journal "
+                  "(.db) of a rig's session; -: stdin; with --server also a stored session's name",
+                  options->max_sets > 1 ? ". Of touches, several: sessions of one rig, in the order "
+                                          "in which they were made"
+                                        : ""));
+    set->required(options->set_required)->expected(options->set_required ? 1 : 0, options->max_sets);
   }
   CLI::Option* model = add_input(
       "--model", options->models, "MODEL",
@@ -337,7 +338,8 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     AddObjects(own, &objects);
   }
   std::vector<source::MeshSpec> meshes;
-  const bool stored = std::any_of(sets.begin(), sets.end(), [](const NamedSet& set) { return !set.session.empty(); });
+  const bool stored =
+      std::any_of(sets.begin(), sets.end(), [](const NamedSet& set) { return !set.session.empty(); });
   if (!objects.empty() && !stored) {
     TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
   }
@@ -370,8 +372,8 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     bytes += further.ByteSizeLong() + sets[i].csv.size();
     if (!sets[i].csv.empty() || bytes > static_cast<size_t>(client::kMaxMessageBytes))
       return absl::InvalidArgumentError(absl::StrCat(
-          "SET: with ", options.sets[i], " the sessions have ", bytes >> 20, " MiB, too much for one request (",
-          client::kMaxMessageBytes >> 20, " MiB, and ", kMaxInline >> 20,
+          "SET: with ", options.sets[i], " the sessions have ", bytes >> 20,
+          " MiB, too much for one request (", client::kMaxMessageBytes >> 20, " MiB, and ", kMaxInline >> 20,
           " MiB of one session after the first); give stored sessions of a --server (`touchstone session "
           "import`), or fewer"));
   }
@@ -388,7 +390,6 @@ absl::StatusOr<std::vector<std::string>> Comparison::ObjectsOfStored(const std::
   TOUCHSTONE_RETURN_IF_ERROR(stored.status());
   return std::vector<std::string>(stored->objects().begin(), stored->objects().end());
 }
-
 
 Comparison::~Comparison() {
   if (sent_ahead_.empty()) return;

@@ -34,7 +34,7 @@ struct ComparisonOptions {
   std::string html;
   std::string json;
   bool set_required = true;
-  bool takes_sets = true;  // false: the command finds the sets by itself
+  bool takes_sets = true;                  // false: the command finds the sets by itself
   std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 

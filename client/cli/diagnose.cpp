@@ -102,13 +102,12 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   v1::DiagnoseRequest request;
   request.set_with_surface_map(options.with_surface_map);
   request.set_save_model(options.keep_as);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                *request.mutable_further() = {comparison->further().begin(),
-                                                              comparison->further().end()};
-                                return comparison->connection().diagnosis().Diagnose(context, request);
-                              }));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::Report report, comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+        return comparison->connection().diagnosis().Diagnose(context, request);
+      }));
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
   if (!options.keep_as.empty()) cli.Log(absl::StrCat("the server keeps the model as ", options.keep_as));
   if (!options.save_model.empty()) return SaveModel(cli, options, report, comparison.get());

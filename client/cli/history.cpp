@@ -60,13 +60,12 @@ absl::Status RunHistory(const Cli& cli, HistoryOptions options) {
                                               options.sets, cli.output().force));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::DiagnoseRequest request;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                *request.mutable_further() = {comparison->further().begin(),
-                                                              comparison->further().end()};
-                                return comparison->connection().diagnosis().Diagnose(context, request);
-                              }));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::Report report, comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+        return comparison->connection().diagnosis().Diagnose(context, request);
+      }));
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (options.ReportOnStdout()) return absl::OkStatus();
   return cli.Print(client::TerminalHistory(report, TerminalWidth(), ColourOnStdout()));

@@ -25,14 +25,16 @@ class SessionsCommandTest : public RealBinaryTest {
   void SetUp() override {
     RealBinaryTest::SetUp();
     Write("nominal.yaml", kSteadyModel);
-    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "3", "-o", "plan.csv"})
+    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "3", "-o",
+                   "plan.csv"})
                   .exit_code,
               0);
   }
   // A session of the plan by a rig whose tips have this radius.
   void MakeSession(const std::string& file, double radius_mm, int seed) {
     Write("rig.yaml", absl::StrCat(kSteadyModel, "  - tip_radius: {radius_mm: ", radius_mm, "}\n"));
-    ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "--model", "rig.yaml", "--seed", std::to_string(seed), "-o", file})
+    ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "--model", "rig.yaml", "--seed", std::to_string(seed), "-o",
+                   file})
                   .exit_code,
               0);
   }
@@ -44,9 +46,10 @@ TEST_F(SessionsCommandTest, DiagnoseNamesTheValueThatChangedAndSavesTheLastModel
   const Outcome outcome =
       Run({"diagnose", "monday.csv", "friday.csv", "--model", "nominal.yaml", "--save-model", "better.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("2 sessions: 72 touches and 72 touches"), HasSubstr("MISSING_EFFECTS"),
-                                 HasSubstr("Changed: tip_radius radius_mm from"), HasSubstr("in friday.csv"),
-                                 HasSubstr("changed by +")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("2 sessions: 72 touches and 72 touches"), HasSubstr("MISSING_EFFECTS"),
+                    HasSubstr("Changed: tip_radius radius_mm from"), HasSubstr("in friday.csv"),
+                    HasSubstr("changed by +")));
   // The saved model is that of Friday: a comparison of both finds it right there, and off on Monday.
   const auto compared = nlohmann::json::parse(
       Run({"compare", "monday.csv", "friday.csv", "--model", "better.yaml", "--json", "-"}).out);
@@ -72,7 +75,8 @@ TEST_F(SessionsCommandTest, HistoryMarksTheSessionOutsideItsLimits) {
   const Outcome outcome = Run({"history", "days", "--model", "nominal.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("days/plan.csv is a plan, without times"));
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("5 sessions, model 'nominal'"), HasSubstr("tip_radius radius_mm")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("5 sessions, model 'nominal'"), HasSubstr("tip_radius radius_mm")));
   for (int day = 1; day <= 5; ++day) {
     const std::string name = absl::StrCat("2026-11-0", day, ".csv");
     const size_t line = outcome.out.rfind(name);
@@ -95,8 +99,9 @@ TEST_F(SessionsCommandTest, MistakesAreNamed) {
   EXPECT_THAT(message({"history", "empty"}), HasSubstr("holds no session"));
   EXPECT_THAT(message({"history", "days"}), HasSubstr("holds one session"));
   EXPECT_THAT(Run({"history", "nowhere"}).err, HasSubstr("'nowhere'"));
-  EXPECT_THAT(message({"compare", "monday.csv", "monday.csv", "--model", "rig.yaml", "--model", "nominal.yaml"}),
-              HasSubstr("several sessions take one model"));
+  EXPECT_THAT(
+      message({"compare", "monday.csv", "monday.csv", "--model", "rig.yaml", "--model", "nominal.yaml"}),
+      HasSubstr("several sessions take one model"));
   EXPECT_THAT(message({"diagnose", "monday.csv", "monday.csv", "--with-formula", "--save-model", "x.yaml"}),
               HasSubstr("--with-formula: is for one SET, and 2 are given"));
   EXPECT_THAT(Run({"compare", "monday.csv", "plan.csv", "--model", "rig.yaml"}).err,

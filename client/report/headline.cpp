@@ -73,7 +73,8 @@ std::string Compared(const v1::Report& report) {
   if (AgreesToRounding(data)) return "The model agrees with the data to the rounding of files and meshes.";
   if (!(rmse > 0)) return "Nothing could be compared.";
   const Floor floor = NoiseFloorOf(data);
-  if (!(floor.sigma > 0)) return absl::StrCat("The model is off by ", scale.Text(rmse), InSession(report), ".");
+  if (!(floor.sigma > 0))
+    return absl::StrCat("The model is off by ", scale.Text(rmse), InSession(report), ".");
   return absl::StrCat("The model is off by ", scale.Text(rmse), ", ", Number(rmse / floor.sigma, 2),
                       " times the noise floor", InSession(report), ".");
 }
@@ -199,8 +200,8 @@ std::string Headline(const v1::Report& report) {
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
       if (report.has_sessions())
-        return absl::StrCat("Nothing is missing and nothing changed: ", model, " is as good as the touches of ",
-                            report.data_size(), " sessions can tell.");
+        return absl::StrCat("Nothing is missing and nothing changed: ", model,
+                            " is as good as the touches of ", report.data_size(), " sessions can tell.");
       return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(MainData(report).count()),
                           " ", ErrorScale(MainData(report)).readings(), " can tell.");
     case v1::Report::WRONG_VALUES:

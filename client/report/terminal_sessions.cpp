@@ -55,7 +55,9 @@ const v1::SessionValue* OfSession(const v1::ComparedValue& value, int session) {
 
 std::string InSession(const v1::ComparedValue& value, int session) {
   const v1::SessionValue* one = OfSession(value, session);
-  return one == nullptr ? "-" : absl::StrCat(ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
+  return one == nullptr
+             ? "-"
+             : absl::StrCat(ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
 }
 
 void AddErrors(const v1::Report& report, TextLayout* out) {
@@ -69,8 +71,8 @@ void AddErrors(const v1::Report& report, TextLayout* out) {
                     {absl::StrCat(Count(data.count()), " touches"), true},
                     {before > 0 ? scale.Text(before) : "-", true},
                     {after > 0 && after < before ? absl::StrCat("-> ", scale.Text(after)) : "", true},
-                    {data.noise_floor() > 0 ? absl::StrCat("floor ", scale.Text(data.noise_floor())) : "", true,
-                     TextLayout::kDim}});
+                    {data.noise_floor() > 0 ? absl::StrCat("floor ", scale.Text(data.noise_floor())) : "",
+                     true, TextLayout::kDim}});
   }
   out->Rows(rows);
 }
@@ -90,11 +92,12 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
     return std::clamp(static_cast<int>(std::lround((at - low) / (high - low) * (kChart - 1))), 0, kChart - 1);
   };
   out->Label(value.between_sessions() > 0 ? "Scatters" : "Steady");
-  out->Paragraph(absl::StrCat(NameOfValue(effect, value), ", ", value.unit(),
-                              value.between_sessions() > 0
-                                  ? absl::StrCat(": scatters by ", Number(value.between_sessions(), 2), " ",
-                                                 value.unit(), " between sessions, beyond its standard errors")
-                                  : ""));
+  out->Paragraph(
+      absl::StrCat(NameOfValue(effect, value), ", ", value.unit(),
+                   value.between_sessions() > 0
+                       ? absl::StrCat(": scatters by ", Number(value.between_sessions(), 2), " ",
+                                      value.unit(), " between sessions, beyond its standard errors")
+                       : ""));
   std::vector<std::vector<TextCell>> rows;
   for (const v1::SessionValue& one : value.sessions()) {
     std::string chart(kChart, ' ');
@@ -131,9 +134,10 @@ std::string TerminalHistory(const v1::Report& report, int width, bool colour) {
   }
   for (const v1::ComparedEffect& effect : sessions.effects())
     for (const v1::ComparedValue& value : effect.values()) AddChart(report, effect, value, &out);
-  out.Lead("o a session's value, X one outside the limits: three standard deviations round the mean of the "
-           "other sessions, of four or more.",
-           TextLayout::kDim);
+  out.Lead(
+      "o a session's value, X one outside the limits: three standard deviations round the mean of the "
+      "other sessions, of four or more.",
+      TextLayout::kDim);
   return out.Take();
 }
 
@@ -157,7 +161,8 @@ void AddSessions(const v1::Report& report, TextLayout* out) {
           row.push_back({absl::StrCat(SessionLabel(report, static_cast<int>(session)), ": ",
                                       InSession(value, static_cast<int>(session)))});
       const bool changed = value.change() == v1::ComparedEffect::CHANGED;
-      row.push_back({ChangeInWords(value, effect.p()), false, changed ? TextLayout::kBad : TextLayout::kPlain});
+      row.push_back(
+          {ChangeInWords(value, effect.p()), false, changed ? TextLayout::kBad : TextLayout::kPlain});
       rows.push_back(row);
     }
   if (rows.size() > 1) out->Rows(rows);

@@ -6,7 +6,8 @@ namespace touchstone {
 namespace {
 
 TEST(FileLabel, IsTheNameWithoutFoldersUnlessTwoFilesShareIt) {
-  const std::vector<std::string> paths = {"lab/monday.csv", "lab/friday.csv", "a/set.csv", "b/set.csv", "stdin"};
+  const std::vector<std::string> paths = {"lab/monday.csv", "lab/friday.csv", "a/set.csv", "b/set.csv",
+                                          "stdin"};
   EXPECT_EQ(FileLabel(paths, 0), "monday.csv");
   EXPECT_EQ(FileLabel(paths, 2), "a/set.csv");
   EXPECT_EQ(FileLabel(paths, 3), "b/set.csv");

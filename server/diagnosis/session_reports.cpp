@@ -14,8 +14,8 @@
 #include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/report/join.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"
+#include "server/diagnosis/session_poses.h"
 #include "server/diagnosis/touch_reports.h"
 #include "server/effects/all_effects.h"
 
@@ -23,8 +23,6 @@ namespace touchstone::diagnosis {
 namespace {
 
 using engine::Verdict;
-
-constexpr int kMaxSessionPairs = 8;  // of the same poses: the sessions one after another, as many as a person reads
 
 absl::Status CheckSessions(const std::vector<DiagnosisInput>& sessions) {
   for (const DiagnosisInput& input : sessions) {
@@ -40,8 +38,8 @@ absl::Status CheckSessions(const std::vector<DiagnosisInput>& sessions) {
       return absl::InvalidArgumentError("several sessions take one model; two were given");
     if (input.set->fingers != sessions[0].set->fingers)
       return absl::InvalidArgumentError(absl::StrCat(
-          input.set->origin, ": has times of ", input.set->fingers, " fingers, and ",
-          sessions[0].set->origin, " of ", sessions[0].set->fingers, "; sessions of one rig were expected"));
+          input.set->origin, ": has times of ", input.set->fingers, " fingers, and ", sessions[0].set->origin,
+          " of ", sessions[0].set->fingers, "; sessions of one rig were expected"));
   }
   return absl::OkStatus();
 }
@@ -119,8 +117,7 @@ class SessionsReporter {
     std::vector<std::vector<engine::DataProblem>> problems;
     bool any = false;
     for (const DiagnosisInput& input : sessions_) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(problems.emplace_back(),
-                                  checks::FindDataProblems(input, Stretch(0, 0.05)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(problems.emplace_back(), checks::FindDataProblems(input, Stretch(0, 0.05)));
       any |= !problems.back().empty();
     }
     if (!any) return false;
@@ -164,7 +161,8 @@ class SessionsReporter {
       DiagnosisInput touches = sessions_[s];
       touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
       const double from = 0.05 + 0.35 * s / count();
-      TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace, selection::MakeWorkspace(touches, Stretch(from, from)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace,
+                                  selection::MakeWorkspace(touches, Stretch(from, from)));
       if (const int needed = TouchesNeeded(*workspace->observations); needed > 0) {
         too_little_.insert(s);
         continue;
@@ -188,8 +186,8 @@ class SessionsReporter {
     for (const int s : too_little_)
       names.push_back(absl::StrCat(Name(s), " needs ", diagnosis_.data[s].needed, " touches"));
     diagnosis_.verdict = Verdict::kTooLittleData;
-    diagnosis_.summary = absl::StrCat("Two sessions with enough touches are needed to say what changed: ",
-                                      absl::StrJoin(names, ", "), ".");
+    diagnosis_.summary = absl::StrCat(
+        "Two sessions with enough touches are needed to say what changed: ", absl::StrJoin(names, ", "), ".");
     return std::move(diagnosis_);
   }
 
@@ -217,18 +215,18 @@ class SessionsReporter {
   absl::Status DiagnoseOne(int s) {
     const double from = 0.6 + 0.35 * s / count(), to = 0.6 + 0.35 * (s + 1) / count();
     const int place = PlaceOf(s);
-    TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis compared, CompareTouches(sessions_[s], Stretch(from, from)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis compared,
+                                CompareTouches(sessions_[s], Stretch(from, from)));
     if (place < 0) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis little,
-                                  DiagnoseTouches(sessions_[s], Stretch(from, to)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis little, DiagnoseTouches(sessions_[s], Stretch(from, to)));
       AddData(std::move(little));
-      diagnosis_.warnings.push_back(absl::StrCat(
-          Name(s), " takes no part in what is said of all sessions: it needs ", diagnosis_.data[s].needed,
-          " touches"));
+      diagnosis_.warnings.push_back(absl::StrCat(Name(s),
+                                                 " takes no part in what is said of all sessions: it needs ",
+                                                 diagnosis_.data[s].needed, " touches"));
       return absl::OkStatus();
     }
     DiagnosisInput input = sessions_[s];
-    const model::Model& own = changes().models[place];
+    const model::Model own = changes().models[place];
     input.model = std::make_shared<const model::Model>(own);
     input.initial_model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
     for (const model::EffectInstance& instance : own.effects)
@@ -236,7 +234,7 @@ class SessionsReporter {
         input.settled.push_back(engine::NameOf(*instance.effect));
     TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, DiagnoseTouches(input, Stretch(from, to)));
     diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, VerdictOfRest(one));
-    for (const report::Step& step : one.steps) still_.push_back({s, step.effect});
+    AddRest(one, s, place);
     AddMistakes(one, s);
     report::DataReport& data = one.data[0];
     const double ratio = changes().heldout[place].ratio;
@@ -257,10 +255,42 @@ class SessionsReporter {
     return absl::OkStatus();
   }
 
-  // With the effects of all sessions in place another one is no step: the sessions do not agree on it.
+  static bool IsOfNoise(const model::Model& model, const std::string& effect) {
+    return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
+      return instance.effect->random() && engine::NameOf(*instance.effect) == effect;
+    });
+  }
+  // Whether all that a session asks for beside the effects of all sessions is another noise.
+  static bool AsksForNoiseAlone(const report::Diagnosis& one) {
+    if (!one.improved_model) return one.steps.empty() && one.refitted.empty();
+    const auto noise = [&](const auto& named) { return IsOfNoise(*one.improved_model, named.effect); };
+    return std::all_of(one.steps.begin(), one.steps.end(), noise) &&
+           std::all_of(one.refitted.begin(), one.refitted.end(), noise);
+  }
+  // Noise is a session's own. Another effect is no step: the sessions do not agree on it.
   static Verdict VerdictOfRest(const report::Diagnosis& one) {
     const bool still = one.verdict == Verdict::kMissingEffects || one.verdict == Verdict::kWrongValues;
-    return still ? Verdict::kUnexplained : one.verdict;
+    return still && !AsksForNoiseAlone(one) ? Verdict::kUnexplained : one.verdict;
+  }
+  void AddRest(const report::Diagnosis& one, int session, int place) {
+    if (!AsksForNoiseAlone(one)) {
+      for (const report::Step& step : one.steps) still_.push_back({session, step.effect});
+      return;
+    }
+    if (!one.improved_model) return;
+    model::Model& own = diagnosis_.sessions->changes->models[place];
+    const std::string name = own.name;
+    own = *one.improved_model;
+    own.name = name;
+    noise_moved_ = true;
+    for (const report::Step& step : one.steps) {
+      const auto same = std::find_if(noise_steps_.begin(), noise_steps_.end(),
+                                     [&](const report::Step& other) { return other.effect == step.effect; });
+      if (same == noise_steps_.end())
+        noise_steps_.push_back(step);
+      else
+        *same = step;  // the last session's
+    }
   }
 
   void AddSteps() {
@@ -292,49 +322,35 @@ class SessionsReporter {
       engine::AddConfounded(step, &diagnosis_.confounded);
       diagnosis_.steps.push_back(std::move(step));
     }
+    for (report::Step& step : noise_steps_) {
+      step.model = changes().models.back();
+      diagnosis_.steps.push_back(std::move(step));
+      // Noise moves no error.
+      for (const int s : taking_part()) {
+        report::DataReport& data = diagnosis_.data[s];
+        if (data.final) data.after_step.push_back(*data.final);
+      }
+    }
     diagnosis_.refitted = changes().refitted;
-    if (!changes().moved()) return;
+    if (!changes().moved() && !noise_moved_) return;
     diagnosis_.improved_model = changes().models.back();
     diagnosis_.improved_model->name = given().name.empty() ? "" : given().name + "_better";
   }
 
-  // Sessions one after another, as far as they touched the same poses.
   absl::Status CompareSamePoses() {
-    struct OfSession {
-      std::unique_ptr<selection::Workspace> given, own;
-      std::vector<double> measured, left;
-    };
-    std::vector<OfSession> all(count());
+    std::vector<SessionOnPoses> all;
     for (int s = 0; s < count(); ++s) {
-      if (!diagnosis_.data[s].noise_floor || !(diagnosis_.data[s].noise_floor->sigma > 0)) continue;
-      DiagnosisInput input = sessions_[s];
-      input.model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
-      TOUCHSTONE_ASSIGN_OR_RETURN(all[s].given, selection::MakeWorkspace(input, Stretch(0.95, 0.95)));
-      all[s].measured = touches::Residuals(*all[s].given->observations, all[s].given->nominal);
+      SessionOnPoses& one = all.emplace_back();
+      one.input = sessions_[s];
+      const auto part = [](const model::Model& model) {
+        return std::make_shared<const model::Model>(selection::TouchPartOf(model));
+      };
+      one.input.model = part(given());
       const int place = diagnosis_.sessions->changes ? PlaceOf(s) : -1;
-      if (place >= 0)
-        input.model = std::make_shared<const model::Model>(selection::TouchPartOf(changes().models[place]));
-      TOUCHSTONE_ASSIGN_OR_RETURN(all[s].own, selection::MakeWorkspace(input, Stretch(0.97, 0.97)));
-      all[s].left = touches::Residuals(*all[s].own->observations, all[s].own->nominal);
+      one.own = place >= 0 ? part(changes().models[place]) : one.input.model;
+      one.noise_floor = diagnosis_.data[s].noise_floor;
     }
-    const auto of = [&](int s, bool left) {
-      const report::NoiseFloor& floor = *diagnosis_.data[s].noise_floor;
-      touches::PosedResiduals residuals;
-      residuals.observations = (left ? all[s].own : all[s].given)->observations.get();
-      residuals.residuals_s = left ? &all[s].left : &all[s].measured;
-      residuals.sigma_s = floor.sigma * kSecondsPerMicrosecond;
-      residuals.degrees_of_freedom = std::max(1.0, floor.degrees_of_freedom);
-      return residuals;
-    };
-    for (int to = 1; to < count() && to <= kMaxSessionPairs; ++to) {
-      const int from = to - 1;
-      if (all[from].given == nullptr || all[to].given == nullptr) continue;
-      report::Sessions::Pair pair;
-      pair.from = from, pair.to = to;
-      pair.measured = touches::CompareSamePoses(of(from, false), of(to, false));
-      pair.left = touches::CompareSamePoses(of(from, true), of(to, true));
-      if (pair.measured.poses > 0) diagnosis_.sessions->same_poses.push_back(pair);
-    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis_.sessions->same_poses, CompareSharedPoses(all, Stretch(0.95, 1)));
     return absl::OkStatus();
   }
 
@@ -379,6 +395,8 @@ class SessionsReporter {
   report::Diagnosis diagnosis_;
   std::set<int> too_little_;
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
+  bool noise_moved_ = false;               // a session has another noise than the given model
+  std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
   std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all
 };
 

@@ -62,7 +62,8 @@ TEST(Sessions, WhatBothLackIsOneStepAndNoChange) {
   EXPECT_GT(found.sessions->same_poses[0].measured.p, 0.01);
   // Every error is what a comparison with the saved model finds.
   std::vector<DiagnosisInput> better = inputs;
-  for (DiagnosisInput& input : better) input.model = std::make_shared<const model::Model>(*found.improved_model);
+  for (DiagnosisInput& input : better)
+    input.model = std::make_shared<const model::Model>(*found.improved_model);
   const auto compared = Compare(better, {});
   ASSERT_TRUE(compared.ok()) << compared.status();
   for (int s = 0; s < 2; ++s) {
@@ -90,12 +91,14 @@ TEST(Sessions, AValueThatChangedIsNamedWithBothOfItsValues) {
   EXPECT_LT(found.sessions->same_poses[0].measured.p, 1e-6);
   EXPECT_GT(found.sessions->same_poses[0].left.p, 1e-3);
   EXPECT_NE(found.summary.find("in day1.csv to 1.5"), std::string::npos) << found.summary;
-  for (const report::DataReport& data : found.data) EXPECT_LT(data.final->rmse, 1.2 * data.noise_floor->sigma);
+  for (const report::DataReport& data : found.data)
+    EXPECT_LT(data.final->rmse, 1.2 * data.noise_floor->sigma);
 }
 
 TEST(Sessions, AnObjectThatWasRemountedIsTheOneThatIsNamed) {
-  const report::Diagnosis found = DiagnoseAll(SessionInputs(
-      {SessionRig(1, {}), SessionRig(2, {{"object_pose", {"scope=object", "lat10.translation_mm=0.4,0.3,0"}}})}));
+  const report::Diagnosis found = DiagnoseAll(
+      SessionInputs({SessionRig(1, {}),
+                     SessionRig(2, {{"object_pose", {"scope=object", "lat10.translation_mm=0.4,0.3,0"}}})}));
   const auto changed = ChangedIn(found);
   ASSERT_EQ(changed.size(), 1u) << found.summary;
   EXPECT_EQ(changed[0]->effect, "object_pose");
@@ -107,8 +110,9 @@ TEST(Sessions, AChangeThatNoValueDescribesIsSaidToBeUnexplained) {
   std::vector<DiagnosisInput> inputs = SessionInputs({SessionRig(1, {}), SessionRig(2, {})});
   auto set = std::make_shared<session::MeasurementSet>(*inputs[1].set);
   for (int row = 0; row < set->size(); ++row) {
-    RandomStream pose(static_cast<uint64_t>(std::llround(1e6 * (set->target_m[row].sum() + set->object[row]))),
-                      RandomDomain::kTest);
+    RandomStream pose(
+        static_cast<uint64_t>(std::llround(1e6 * (set->target_m[row].sum() + set->object[row]))),
+        RandomDomain::kTest);
     for (int i = 0; i < 3; ++i) set->time_s[static_cast<size_t>(row) * 3 + i] += 0.003 * pose.Normal();
   }
   inputs[1].set = set;
@@ -136,8 +140,7 @@ TEST(Sessions, ASessionWithTooFewTouchesTakesNoPart) {
   touches::HiddenRig little = SessionRig(3, {});
   little.objects = {"lat10"};
   little.samples_per_face = 1, little.rounds = 1;
-  const report::Diagnosis found =
-      DiagnoseAll(SessionInputs({SessionRig(1, {}), little, SessionRig(2, {})}));
+  const report::Diagnosis found = DiagnoseAll(SessionInputs({SessionRig(1, {}), little, SessionRig(2, {})}));
   EXPECT_EQ(found.sessions->taking_part, (std::vector<int>{0, 2}));
   EXPECT_GT(found.data[1].needed, 0);
   EXPECT_EQ(found.verdict, Verdict::kAdequate) << found.summary;
@@ -161,9 +164,9 @@ TEST(Sessions, ChangesOfTenStandardErrorsAreFoundAndNothingElse) {
   int found_changed = 0, false_changes = 0, three = 0;
   double std_error = 0;
   const auto pair = [](double radius, uint64_t seed) {
-    return DiagnoseAll(SessionInputs(
-        {SessionRig(2 * seed, {{"tip_radius", {"radius_mm=1.5"}}}),
-         SessionRig(2 * seed + 1, {{"tip_radius", {"radius_mm=" + std::to_string(radius)}}})}));
+    return DiagnoseAll(
+        SessionInputs({SessionRig(2 * seed, {{"tip_radius", {"radius_mm=1.5"}}}),
+                       SessionRig(2 * seed + 1, {{"tip_radius", {"radius_mm=" + std::to_string(radius)}}})}));
   };
   for (uint64_t seed = 1; seed <= kPairs; ++seed) {
     const report::Diagnosis same = pair(1.5, seed);
@@ -176,8 +179,10 @@ TEST(Sessions, ChangesOfTenStandardErrorsAreFoundAndNothingElse) {
                                  [](const auto* effect) { return effect->effect != "tip_radius"; });
     three += !ChangedIn(pair(1.5 + 3 * std_error, seed + 200)).empty();
   }
-  std::printf("standard error of the difference %.3g mm; of %d pairs: 10 standard errors found in %d, 3 in %d; false %d\n",
-              std_error, kPairs, found_changed, three, false_changes);
+  std::printf(
+      "standard error of the difference %.3g mm; of %d pairs: 10 standard errors found in %d, 3 in %d; false "
+      "%d\n",
+      std_error, kPairs, found_changed, three, false_changes);
   EXPECT_EQ(false_changes, 0);
   EXPECT_EQ(found_changed, kPairs);
 }

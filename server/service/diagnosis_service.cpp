@@ -177,14 +177,13 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
           return report;
         }
         if (work.further.size() > kMaxFurther)
-          return absl::InvalidArgumentError(absl::StrCat("further has ", work.further.size(),
-                                                         " sessions: at most ", kMaxFurther));
+          return absl::InvalidArgumentError(
+              absl::StrCat("further has ", work.further.size(), " sessions: at most ", kMaxFurther));
         std::vector<diagnosis::DiagnosisInput> sessions = {input};
         std::vector<std::string> hashes = {HashOfSet(evidence, input, *resources)};
         for (const v1::Evidence& further : work.further) {
           const v1::Evidence session = SessionOf(evidence, further);
-          TOUCHSTONE_ASSIGN_OR_RETURN(sessions.emplace_back(),
-                                      ReadEvidence(session, *resources, work.times));
+          TOUCHSTONE_ASSIGN_OR_RETURN(sessions.emplace_back(), ReadEvidence(session, *resources, work.times));
           hashes.push_back(HashOfSet(session, sessions.back(), *resources));
         }
         TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work.run_sessions(sessions, how));

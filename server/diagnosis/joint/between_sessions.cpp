@@ -14,8 +14,7 @@ std::pair<ControlLimits, double> LimitsFrom(const std::vector<SessionEstimate>& 
                                             const SessionEstimate& own) {
   const BetweenSessions between = EstimateBetweenSessions(others);
   const double distance =
-      kLimitDeviations *
-      std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
+      kLimitDeviations * std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
   const double excess = std::abs(own.value - between.mean) / distance;
   return {{between.mean - distance, between.mean + distance, excess > 1}, excess};
 }

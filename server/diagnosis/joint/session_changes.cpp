@@ -12,9 +12,6 @@
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr double kChangedErrors = 3;     // of a single entry, where its effect has changed
-constexpr double kGradientStep = 1e-4;   // over the parameter's scale
-
 // The effects that the sessions are compared in: the given model's, and those that any session names.
 std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
   std::vector<SharedEffect> effects;
@@ -30,7 +27,7 @@ std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
       const bool named = std::any_of(candidates.begin(), candidates.end(), [&](const engine::Candidate& c) {
         return !c.nameless && engine::NameOf(*c.effect) == found.name();
       });
-      if (found.given || !named) continue;
+      if (found.given || !named || !side.modality->ClaimsAlone(found.name())) continue;
       const auto same = std::find_if(effects.begin(), effects.end(),
                                      [&](const SharedEffect& e) { return e.name() == found.name(); });
       if (same == effects.end()) {
@@ -47,32 +44,6 @@ std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
   }
   return effects;
 }
-
-// How far each entry of a description moves with each of the session's values; the entries' unit over SI.
-Eigen::MatrixXd GradientsOf(const engine::Parameterization& model, int effect, const Eigen::VectorXd& point) {
-  const std::vector<engine::ParameterEstimate> at = model.Describe(effect, point, {});
-  Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(at.size()), model.size());
-  for (int i = 0; i < model.size(); ++i) {
-    const engine::FreeParameter& parameter = model.parameters()[i];
-    if (parameter.effect != effect) continue;
-    double step = kGradientStep * parameter.scale;
-    if (point[i] + step > parameter.upper) step = -step;
-    Eigen::VectorXd moved = point;
-    moved[i] += step;
-    const std::vector<engine::ParameterEstimate> there = model.Describe(effect, moved, {});
-    for (size_t e = 0; e < at.size(); ++e)
-      gradients(static_cast<Eigen::Index>(e), i) = (there[e].value - at[e].value) / step;
-  }
-  return gradients;
-}
-
-// One effect of one session, described.
-struct DescribedSession {
-  int session = 0;
-  std::vector<engine::ParameterEstimate> entries;  // of the group
-  Eigen::MatrixXd gradients;                       // entries x the session's values
-  std::vector<double> moves;  // the rows, over the noise, by one unit of each entry
-};
 
 class ChangeFinder {
  public:
@@ -93,7 +64,8 @@ class ChangeFinder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit fit, FitWith(Kept()));
     TOUCHSTONE_RETURN_IF_ERROR(Enter(0.6));
     for (size_t group = 0; group < evidence_->groups().size(); ++group)
-      if (!IsAbsent(static_cast<int>(group))) found_.effects.push_back(Compared(static_cast<int>(group)));
+      if (!IsAbsent(static_cast<int>(group)))
+        found_.effects.push_back(DescribeGroup(*evidence_, *choice_, static_cast<int>(group)));
     found_.models = ModelsOf(fit, Kept());
     TOUCHSTONE_RETURN_IF_ERROR(AddSteps(fit));
     AddRefitted(fit);
@@ -101,8 +73,7 @@ class ChangeFinder {
     for (const Side& side : sides_) {
       engine::HeldOutError error;
       if (found_.moved()) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(error,
-                                    side.modality->HeldOut(fit.fits[side.kind], fit.fits[side.kind]));
+        TOUCHSTONE_ASSIGN_OR_RETURN(error, side.modality->HeldOut(fit.fits[side.kind], fit.fits[side.kind]));
       }
       found_.heldout.push_back(error);
     }
@@ -157,8 +128,8 @@ class ChangeFinder {
   absl::StatusOr<JointFit> FitWith(const std::vector<SharedEffect>& effects) const {
     std::vector<Part> parts;
     for (const Side& side : sides_)
-      parts.push_back({&side.modality->experiment(), StartOf(side, effects),
-                       evidence_->variance_factor(side.kind)});
+      parts.push_back(
+          {&side.modality->experiment(), StartOf(side, effects), evidence_->variance_factor(side.kind)});
     return FitJointly(parts, [this](const engine::Parameterization& model, int parameter) {
       return IsOwn(model, parameter);
     });
@@ -196,104 +167,6 @@ class ChangeFinder {
     return models;
   }
 
-  // The group's values where each session has its own, all else as found.
-  ComparedEffect Compared(int g) const {
-    ComparedEffect compared;
-    compared.effect = group(g).effect;
-    compared.object = group(g).object;
-    compared.given = group(g).given;
-    compared.values = state(g);
-    const SharedEvidence one =
-        evidence_->Of(WithState(choice_->states(), g, SessionValues::kShared));
-    const SharedEvidence apart = evidence_->Of(WithState(choice_->states(), g, SessionValues::kOwn));
-    if (choice_->IsCompared(g)) {
-      compared.p = choice_->PApart(one, apart);
-      compared.gain_nats = apart.log_evidence - one.log_evidence;
-    }
-    if (state(g) == SessionValues::kOwn) compared.equivalent = choice_->EquivalentChanges(g);
-    DescribeEntries(g, apart, &compared);
-    return compared;
-  }
-
-  DescribedSession Described(int g, int session, const SharedEvidence& apart) const {
-    const engine::Parameterization& model = evidence_->fit(session).model;
-    const int effect = IndexOf(model.base(), group(g).effect);
-    const Eigen::VectorXd point = evidence_->PointOf(apart, session);
-    const std::vector<engine::ParameterEstimate> all =
-        model.Describe(effect, point, evidence_->CovarianceOf(apart, session, session));
-    const Eigen::MatrixXd gradients = GradientsOf(model, effect, point);
-    DescribedSession described;
-    described.session = session;
-    described.gradients.resize(0, model.size());
-    for (size_t e = 0; e < all.size(); ++e) {
-      if (all[e].object != group(g).object) continue;
-      described.entries.push_back(all[e]);
-      described.gradients.conservativeResize(described.gradients.rows() + 1, Eigen::NoChange);
-      const Eigen::RowVectorXd gradient = gradients.row(static_cast<Eigen::Index>(e));
-      described.gradients.bottomRows(1) = gradient;
-      double moves = 0;
-      for (int i = 0; i < model.size(); ++i)
-        if (gradient[i] != 0)
-          moves += std::pow(gradient[i] / gradient.squaredNorm() * evidence_->MovesRows(session, i), 2);
-      described.moves.push_back(std::sqrt(moves));
-    }
-    return described;
-  }
-
-  void DescribeEntries(int g, const SharedEvidence& apart, ComparedEffect* compared) const {
-    std::vector<DescribedSession> sessions;
-    for (const int session : group(g).sessions) sessions.push_back(Described(g, session, apart));
-    double most = 0;
-    std::vector<double> errors;
-    for (size_t e = 0; e < sessions[0].entries.size(); ++e) {
-      ComparedValue value;
-      value.by_session.resize(sides_.size());
-      for (const DescribedSession& described : sessions)
-        value.by_session[described.session] = described.entries[e];
-      double farthest = -1;
-      for (size_t b = 1; b < sessions.size(); ++b)
-        for (size_t a = 0; a < b; ++a) CompareTwo(sessions[a], sessions[b], e, apart, &farthest, &value);
-      errors.push_back(std::max(farthest, 0.0));
-      most = std::max(most, errors.back());
-      compared->entries.push_back(std::move(value));
-    }
-    for (size_t e = 0; e < compared->entries.size(); ++e) {
-      ComparedValue& value = compared->entries[e];
-      if (state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors))
-        value.change = ValueChange::kChanged;
-      else if (choice_->IsCompared(g) && value.std_error > 0)
-        value.change = Unmoved(sessions, e, value) ? ValueChange::kUnchanged : ValueChange::kCannotSay;
-    }
-  }
-
-  // Sets the difference of two sessions where it is farther from zero than those so far.
-  void CompareTwo(const DescribedSession& from, const DescribedSession& to, size_t entry,
-                  const SharedEvidence& apart, double* farthest, ComparedValue* value) const {
-    const auto e = static_cast<Eigen::Index>(entry);
-    const auto covariance = [&](const DescribedSession& one, const DescribedSession& other) {
-      return one.gradients.row(e).dot(evidence_->CovarianceOf(apart, one.session, other.session) *
-                                      other.gradients.row(e).transpose());
-    };
-    const double variance = covariance(from, from) + covariance(to, to) - 2 * covariance(from, to);
-    const double difference = to.entries[entry].value - from.entries[entry].value;
-    const double std_error = std::sqrt(std::max(variance, 0.0));
-    const double errors = std_error > 0 ? std::abs(difference) / std_error : 0;
-    if (errors <= *farthest) return;
-    *farthest = errors;
-    value->from = from.session, value->to = to.session;
-    value->difference = difference, value->std_error = std_error;
-    value->lower = difference - kNormalQuantile975 * std_error;
-    value->upper = difference + kNormalQuantile975 * std_error;
-  }
-
-  // Whether no difference in the interval would move rows by more than their noise.
-  static bool Unmoved(const std::vector<DescribedSession>& sessions, size_t entry,
-                      const ComparedValue& value) {
-    double moves = 0;
-    for (const DescribedSession& described : sessions) moves = std::max(moves, described.moves[entry]);
-    return moves * std::max(std::abs(value.lower), std::abs(value.upper)) <= 1;
-  }
-
   // Effects that were added, each with its gain over doing without it; the rungs are fitted with the simulator.
   absl::Status AddSteps(const JointFit& whole) {
     std::vector<SharedEffect> given, open;
@@ -329,9 +202,8 @@ class ChangeFinder {
   SessionStates OnlyWith(const std::vector<SharedEffect>& effects) const {
     SessionStates states = choice_->states();
     for (int g = 0; g < groups(); ++g)
-      if (!group(g).given && std::none_of(effects.begin(), effects.end(), [&](const SharedEffect& e) {
-            return e.name() == group(g).effect;
-          }))
+      if (!group(g).given && std::none_of(effects.begin(), effects.end(),
+                                          [&](const SharedEffect& e) { return e.name() == group(g).effect; }))
         states[g] = SessionValues::kGiven;
     return states;
   }

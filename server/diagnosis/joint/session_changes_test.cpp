@@ -27,7 +27,8 @@ std::unique_ptr<engine::RowModality> Session(const Truth& truth, uint64_t seed,
                                              const std::vector<std::string>& given = {}) {
   auto rows = std::make_shared<engine::LinearTestModel>(kGroups, kBlocks, kRepeats);
   uint64_t column = 0;
-  for (const char* effect : kEffects) rows->columns[effect] = rows->Random(kColumnSeed + ++column, kSessionPerMetre);
+  for (const char* effect : kEffects)
+    rows->columns[effect] = rows->Random(kColumnSeed + ++column, kSessionPerMetre);
   rows->measured = rows->Random(seed, kNoise);
   for (const auto& [effect, value] : truth) rows->measured += value * rows->columns.at(effect);
   engine::RowModality::Description description;
@@ -51,7 +52,8 @@ std::unique_ptr<engine::RowModality> Session(const Truth& truth, uint64_t seed,
   return *std::move(made);
 }
 
-SessionChanges Find(const std::vector<Truth>& truths, uint64_t seed, const std::vector<std::string>& given = {}) {
+SessionChanges Find(const std::vector<Truth>& truths, uint64_t seed,
+                    const std::vector<std::string>& given = {}) {
   std::vector<std::unique_ptr<engine::RowModality>> sessions;
   std::vector<const engine::Modality*> all;
   for (size_t s = 0; s < truths.size(); ++s) {
@@ -137,7 +139,8 @@ TEST(SessionChanges, AValueOfTheGivenModelThatBothSessionsWantOtherwiseIsRefitte
 TEST(SessionChanges, NothingMissingAndNothingChangedLeavesTheGivenModel) {
   const SessionChanges found = Find({{}, {}}, 5, {"object_push"});
   EXPECT_FALSE(found.moved());
-  for (const model::Model& model : found.models) EXPECT_EQ(model.Hash(), Session({}, 1, {"object_push"})->given().Hash());
+  for (const model::Model& model : found.models)
+    EXPECT_EQ(model.Hash(), Session({}, 1, {"object_push"})->given().Hash());
 }
 
 }  // namespace

@@ -2,37 +2,67 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numeric>
-#include <set>
 #include <utility>
 
+#include "server/base/distributions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr double kMovedShare = 1e-3;  // of a column's largest entry: a row that moves so little does not count as moved
+constexpr int kStretches[] = {8, 24};  // of a session, in which errors may wander
+constexpr double kChance = 1e-3;       // of blocks that scatter so much by chance, over all that is tried
+constexpr double kMovedShare =
+    1e-3;  // of a column's largest entry: a row that moves so little does not count as moved
 
-// Mean square of what blocks of rows have in common over that of one row: 1 where rows of a block share nothing. Where a smooth
-// error takes part it explains what they share.
-double VarianceFactor(const engine::ObservationModel& rows, const engine::Fit& fit) {
-  if (fit.hypothesis != 0 || !(fit.sigma > 0)) return 1;
-  std::map<int, std::pair<double, int>> blocks;
+// Rows by what they may share an error with: the repeats of a pose, stretches of the session.
+std::vector<std::vector<int>> GroupingsOf(const engine::ObservationModel& rows) {
+  std::vector<std::vector<int>> groupings(1 + std::size(kStretches), std::vector<int>(rows.rows()));
+  double first = INFINITY, last = -INFINITY;
+  for (int r = 0; r < rows.rows(); ++r)
+    first = std::min(first, rows.TimeOfRow(r)), last = std::max(last, rows.TimeOfRow(r));
   for (int r = 0; r < rows.rows(); ++r) {
-    auto& [sum, count] = blocks[rows.BlockOfRow(r)];
-    sum += fit.columns.values(r, 0), ++count;
+    groupings[0][r] = rows.BlockOfRow(r);
+    const double share = last > first ? (rows.TimeOfRow(r) - first) / (last - first) : 0;
+    for (size_t i = 0; i < std::size(kStretches); ++i)
+      groupings[1 + i][r] = std::min(static_cast<int>(share * kStretches[i]), kStretches[i] - 1);
   }
-  double squares = 0;
-  for (const auto& [block, of] : blocks) squares += of.first * of.first / of.second;
-  const double degrees = static_cast<double>(blocks.size()) - fit.model.size();
-  return degrees < 1 ? 1 : std::max(1.0, squares / degrees / (fit.sigma * fit.sigma));
+  return groupings;
 }
 
-int CountBlocks(const engine::ObservationModel& rows) {
-  std::set<int> blocks;
-  for (int r = 0; r < rows.rows(); ++r) blocks.insert(rows.BlockOfRow(r));
-  return static_cast<int>(blocks.size());
+// By how much the variance of a value that follows `column` exceeds what independent rows give it, where rows of a block share
+// errors: from the scatter of the blocks' scores (a sandwich estimator); 1 where chance gives as much.
+double BlockFactor(const Eigen::VectorXd& column, const Eigen::VectorXd& residual, double sigma,
+                   const std::vector<int>& block_of_row, double chance) {
+  std::map<int, std::pair<double, double>> blocks;  // score, information
+  for (Eigen::Index r = 0; r < column.size(); ++r) {
+    auto& [score, information] = blocks[block_of_row[static_cast<size_t>(r)]];
+    score += column[r] * residual[r], information += column[r] * column[r];
+  }
+  double squares = 0, sum = 0, sum2 = 0;
+  for (const auto& [block, of] : blocks) {
+    squares += of.first * of.first;
+    sum += of.second, sum2 += of.second * of.second;
+  }
+  if (!(sum > 0)) return 1;
+  const double factor = squares / (sum * sigma * sigma), degrees = sum * sum / sum2;
+  return factor > 1 && ChiSquaredTail(factor * degrees, degrees) < chance ? factor : 1;
+}
+
+// Of the value that suffers most. Where a smooth error takes part it explains what rows of a place share.
+double VarianceFactor(const engine::ObservationModel& rows, const engine::Fit& fit) {
+  const Eigen::MatrixXd& columns = fit.columns.values;
+  if (fit.hypothesis != 0 || !(fit.sigma > 0) || columns.cols() < 2) return 1;
+  const std::vector<std::vector<int>> groupings = GroupingsOf(rows);
+  const double chance = kChance / (static_cast<double>(groupings.size()) * static_cast<double>(columns.cols() - 1));
+  double factor = 1;
+  for (const std::vector<int>& grouping : groupings)
+    for (Eigen::Index j = 1; j < columns.cols(); ++j)
+      factor = std::max(factor, BlockFactor(columns.col(j), columns.col(0), fit.sigma, grouping, chance));
+  return factor;
 }
 
 }  // namespace
@@ -45,7 +75,7 @@ absl::StatusOr<SessionEvidence> SessionEvidence::Create(const std::vector<Side>&
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(experiment, side.Free(effects, {})));
     const double factor = VarianceFactor(*experiment.observations, fit);
     evidence.variance_factors_.push_back(factor);
-    evidence.independent_ += factor > 1 ? CountBlocks(*experiment.observations) : experiment.likelihood->rows();
+    evidence.independent_ += experiment.likelihood->rows() / factor;
     evidence.fits_.push_back(std::move(fit));
   }
   evidence.ListValues();
@@ -102,8 +132,7 @@ void SessionEvidence::PrepareForms(const std::vector<Side>& sides, const std::ve
     Eigen::MatrixXd moved = Eigen::MatrixXd::Identity(given.size() + 1, given.size() + 1);
     moved.col(0).tail(given.size()) = fit.point - given;
     const Eigen::MatrixXd gram = likelihood.Gram(fit.columns, fit.hypothesis);
-    forms_.push_back(moved.transpose() * gram * moved /
-                     (fit.sigma * fit.sigma * variance_factors_[session]));
+    forms_.push_back(moved.transpose() * gram * moved / (fit.sigma * fit.sigma * variance_factors_[session]));
     given_.push_back(given);
     rows += likelihood.rows();
   }
@@ -144,9 +173,8 @@ SharedEvidence SessionEvidence::Of(const std::vector<SessionValues>& states) con
   }
   std::vector<int> members(free + 1);
   std::iota(members.begin(), members.end(), 0);
-  const engine::LaplaceEvidence found =
-      engine::ComputeLaplaceEvidence(*unit_, {form}, members, parameters,
-                                     Eigen::Map<const Eigen::VectorXd>(given.data(), free));
+  const engine::LaplaceEvidence found = engine::ComputeLaplaceEvidence(
+      *unit_, {form}, members, parameters, Eigen::Map<const Eigen::VectorXd>(given.data(), free));
   evidence.log_evidence = found.log_evidence;
   evidence.step = found.step;
   evidence.covariance = found.covariance;

@@ -22,20 +22,21 @@ enum class SessionValues {
 // Values that change together: those of one effect, or, where they differ by object, those of one object.
 struct ValueGroup {
   std::string effect, object;
-  bool given = false;                  // of the given model
-  std::vector<int> sessions;           // that measure it
-  std::vector<int> values;             // of SessionEvidence
-  double least_nats = 0;               // of log evidence, that the values need over none
+  bool given = false;         // of the given model
+  std::vector<int> sessions;  // that measure it
+  std::vector<int> values;    // of SessionEvidence
+  double least_nats = 0;      // of log evidence, that the values need over none
 };
 
 // What an assumption about every group leaves.
 struct SharedEvidence {
   double log_evidence = 0;
-  double squares = 0;                    // twice the fall of the log likelihood: chi-squared of what is assumed beyond
-  int free = 0;                          // values
-  std::vector<std::vector<int>> place;   // by session and value of the session: among the free values; -1: held
-  Eigen::VectorXd step;                  // of the free values, from the given ones
-  Eigen::MatrixXd covariance;            // of the free values
+  double squares = 0;  // twice the fall of the log likelihood: chi-squared of what is assumed beyond
+  int free = 0;        // values
+  std::vector<std::vector<int>>
+      place;                   // by session and value of the session: among the free values; -1: held
+  Eigen::VectorXd step;        // of the free values, from the given ones
+  Eigen::MatrixXd covariance;  // of the free values
 };
 
 class SessionEvidence {
@@ -48,7 +49,8 @@ class SessionEvidence {
   int sessions() const { return static_cast<int>(fits_.size()); }
   // Of each session with every value its own.
   const engine::Fit& fit(int session) const { return fits_[session]; }
-  // By how much the variance between blocks of the session's rows exceeds what its rows say, at least 1.
+  // By how much the variance of the session's values exceeds what independent rows give them, at least 1: where repeats of a
+  // pose or stretches of the session share errors.
   double variance_factor(int session) const { return variance_factors_[session]; }
 
   // `states`: one per group.
@@ -58,8 +60,7 @@ class SessionEvidence {
   Eigen::MatrixXd CovarianceOf(const SharedEvidence& evidence, int session, int other) const;
   // By how much one unit of a session's value moves its rows: root mean square over the rows that it moves, over the noise.
   double MovesRows(int session, int value) const;
-  // Degrees of freedom of the noise under an assumption: independent rows, or blocks where rows of a block share errors, less
-  // the free values.
+  // Degrees of freedom of the noise under an assumption: rows, fewer where they share errors, less the free values.
   double DegreesUnder(const SharedEvidence& evidence) const;
 
  private:
@@ -72,14 +73,15 @@ class SessionEvidence {
 
   std::vector<engine::Fit> fits_;
   std::vector<double> variance_factors_;
-  double independent_ = 0;                     // rows or blocks
-  std::vector<Value> values_;                  // of all sessions
-  std::vector<std::vector<int>> value_of_;     // by session and its value: index into values_
+  double independent_ = 0;                  // rows or blocks
+  std::vector<Value> values_;               // of all sessions
+  std::vector<std::vector<int>> value_of_;  // by session and its value: index into values_
   std::vector<ValueGroup> groups_;
-  std::vector<Eigen::MatrixXd> forms_;         // by session: of [residual | derivatives] where the values are the given ones,
-                                               // over the noise
-  std::vector<Eigen::VectorXd> given_;         // by session: the given values
-  std::shared_ptr<engine::Likelihood> unit_;   // noise 1
+  std::vector<Eigen::MatrixXd>
+      forms_;  // by session: of [residual | derivatives] where the values are the given ones,
+               // over the noise
+  std::vector<Eigen::VectorXd> given_;        // by session: the given values
+  std::shared_ptr<engine::Likelihood> unit_;  // noise 1
 };
 
 }  // namespace touchstone::diagnosis::joint

@@ -166,8 +166,8 @@ struct Sessions {
     int from = 0, to = 0;
     touches::SamePoses measured, left;  // under the given model, and under each session's own
   };
-  int count = 0;                 // of all sessions
-  std::vector<int> taking_part;           // sessions with enough touches; those of `changes`, in order
+  int count = 0;                                 // of all sessions
+  std::vector<int> taking_part;                  // sessions with enough touches; those of `changes`, in order
   std::optional<joint::SessionChanges> changes;  // none: a comparison, or fewer than two take part
   std::vector<Pair> same_poses;
   std::string words;

@@ -14,7 +14,8 @@ namespace {
 constexpr double kLeastP = 1e-300;
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
-  return absl::StrCat(effect.effect, " ", value.name, value.entry.empty() ? "" : absl::StrCat(" ", value.entry),
+  return absl::StrCat(effect.effect, " ", value.name,
+                      value.entry.empty() ? "" : absl::StrCat(" ", value.entry),
                       effect.object.empty() ? "" : absl::StrCat(" of ", effect.object));
 }
 
@@ -26,8 +27,8 @@ std::string ChangedInWords(const Sessions& sessions, const std::vector<DataRepor
     const engine::ParameterEstimate &from = *value.by_session[value.from], &to = *value.by_session[value.to];
     changes.push_back(absl::StrFormat(
         "%s from %.4g +- %.2g %s in %s to %.4g +- %.2g %s in %s", ValueName(effect, from), from.value,
-        from.std_error, from.unit, SessionName(data, sessions.taking_part[value.from]), to.value, to.std_error,
-        to.unit, SessionName(data, sessions.taking_part[value.to])));
+        from.std_error, from.unit, SessionName(data, sessions.taking_part[value.from]), to.value,
+        to.std_error, to.unit, SessionName(data, sessions.taking_part[value.to])));
   }
   std::string words = absl::StrFormat("Changed: %s (by chance with p = %.1g).", absl::StrJoin(changes, "; "),
                                       std::max(effect.p, kLeastP));
@@ -49,11 +50,15 @@ std::string OthersInWords(const joint::SessionChanges& changes) {
   std::string words;
   if (changed == 0) words = "No value of the model changed between the sessions";
   if (unchanged > 0)
-    absl::StrAppend(&words, changed == 0 ? ": " : "", unchanged, others, unchanged == 1 ? " value is" : " values are",
+    absl::StrAppend(&words, changed == 0 ? ": " : "", unchanged, others,
+                    unchanged == 1 ? " value is" : " values are",
                     " the same as far as the noise of one touch would show");
   if (unknown > 0)
-    absl::StrAppend(&words, unchanged > 0 ? ", and of " : changed == 0 ? "; of " : "Of ", unknown,
-                    unchanged > 0 ? "" : others, unknown == 1 ? " value" : " values",
+    absl::StrAppend(&words,
+                    unchanged > 0  ? ", and of "
+                    : changed == 0 ? "; of "
+                                   : "Of ",
+                    unknown, unchanged > 0 ? "" : others, unknown == 1 ? " value" : " values",
                     " these sessions cannot say");
   return words.empty() ? "" : words + ".";
 }
@@ -85,9 +90,9 @@ std::string SessionsInWords(const Sessions& sessions, const std::vector<DataRepo
         shown.poses, SessionName(data, pair.from), SessionName(data, pair.to),
         modelled ? "less what each session's model expects " : "", shown.rms_s * 1e3, shown.expected_s * 1e3,
         std::max(shown.p, kLeastP),
-        shown.p >= kSamePosesP      ? "."
-        : sessions.changes ? ": something changed that no value of the model describes."
-                           : ": the sessions differ, whatever the model."));
+        shown.p >= kSamePosesP ? "."
+        : sessions.changes     ? ": something changed that no value of the model describes."
+                               : ": the sessions differ, whatever the model."));
   }
   return absl::StrJoin(sentences, " ");
 }

@@ -62,11 +62,9 @@ SamePoses CompareSamePoses(const PosedResiduals& one, const PosedResiduals& othe
     const auto found = second.find(command);
     if (found == second.end()) continue;
     const MeanAtPose& b = found->second;
-    const double variance =
-        one.sigma_s * one.sigma_s / a.touches + other.sigma_s * other.sigma_s / b.touches;
+    const double variance = one.sigma_s * one.sigma_s / a.touches + other.sigma_s * other.sigma_s / b.touches;
     double sum = 0;
-    for (int i = 0; i < fingers; ++i)
-      sum += std::pow(b.sum_s[i] / b.touches - a.sum_s[i] / a.touches, 2);
+    for (int i = 0; i < fingers; ++i) sum += std::pow(b.sum_s[i] / b.touches - a.sum_s[i] / a.touches, 2);
     squares += sum, scaled += sum / variance, expected += variance;
     ++same.poses;
   }

@@ -18,8 +18,8 @@ SamePoses Compared(const HiddenRig& one, const HiddenRig& other) {
     auto made = MakeObservations(MakeTestInput(*rig));
     EXPECT_TRUE(made.ok()) << made.status();
     observations.push_back(*std::move(made));
-    residuals.push_back(
-        Residuals(observations.back(), *Predict(observations.back(), model::NominalModel(), false, false, nullptr)));
+    residuals.push_back(Residuals(
+        observations.back(), *Predict(observations.back(), model::NominalModel(), false, false, nullptr)));
   }
   const auto of = [&](int s) { return PosedResiduals{&observations[s], &residuals[s], kSigmaS, kDegrees}; };
   return CompareSamePoses(of(0), of(1));
