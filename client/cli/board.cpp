@@ -76,7 +76,7 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardLayout layout,
                               boards::ParseBoardLayout(board.corners, board.square_mm));
   TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, NominalLensModel(options.model()));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardSet set, boards::ReadBoardPictures(options.set, layout));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardSet set, boards::ReadBoardPictures(options.set(), layout));
   TOUCHSTONE_ASSIGN_OR_RETURN(const boards::BoardDiagnosis diagnosis,
                               boards::DiagnoseBoards(set, model, options.seed));
   v1::Report report = diagnosis::report::ToReport(diagnosis::report::FromBoards(diagnosis, set));

@@ -207,6 +207,7 @@ void AddDiagnose(Cli* cli);
 void AddCheck(Cli* cli);
 void AddRehearse(Cli* cli);
 void AddExplain(Cli* cli);
+void AddHistory(Cli* cli);
 void AddPropose(Cli* cli);
 void AddWorkbench(Cli* cli);
 void AddSession(Cli* cli);

@@ -58,6 +58,35 @@ absl::StatusOr<NamedSet> ReadFolder(const std::string& folder) {
   return set;
 }
 
+// What messages call it.
+std::string OriginOf(const std::string& text, const NamedSet& set) {
+  if (!set.session.empty()) return "";
+  if (text == "-") return "stdin";
+  return set.images ? (fs::path(text) / session::kTouchesCsv).string() : text;
+}
+
+// Puts the touches into the evidence; what is too large for one request stays in set->csv.
+absl::Status SetMeasurements(const std::string& text, NamedSet* set, v1::Evidence* evidence) {
+  if (!set->session.empty()) {
+    evidence->set_session(set->session);
+    return absl::OkStatus();
+  }
+  if (set->measured.has_value()) {
+    *evidence->mutable_set() = service::ToProto(*set->measured);
+    if (evidence->set().ByteSizeLong() <= kMaxInline) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(set->csv, JournalCsv(text, ""));
+  }
+  if (set->csv.size() > kMaxInline) return absl::OkStatus();
+  evidence->set_csv(std::move(set->csv));
+  set->csv.clear();
+  return absl::OkStatus();
+}
+
+void AddObjects(const std::vector<std::string>& more, std::vector<std::string>* objects) {
+  for (const std::string& object : more)
+    if (std::find(objects->begin(), objects->end(), object) == objects->end()) objects->push_back(object);
+}
+
 // Its objects, those of the touches first. Reads all, so that errors name files here.
 absl::StatusOr<std::vector<std::string>> ObjectsOf(const std::string& origin, NamedSet* set) {
   std::vector<std::string> objects;
@@ -70,8 +99,7 @@ absl::StatusOr<std::vector<std::string>> ObjectsOf(const std::string& origin, Na
   if (!set->images) return objects;
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet read, session::ParseImageSet(*set->images));
   set->images_sha256 = read.sha256;
-  for (const std::string& name : read.objects)
-    if (std::find(objects.begin(), objects.end(), name) == objects.end()) objects.push_back(name);
+  AddObjects(read.objects, &objects);
   return objects;
 }
 
@@ -214,16 +242,20 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
     cli->AddInput(command, option);
     return option;
   };
-  add_input(options->set_name, options->set, "",
-            !options->set_text.empty() ? options->set_text
-                                       : "The measurement file (CSV), the folder of photographs (images.csv, "
-                                         "camera.yaml and PNG files; with a "
-                                         "touches.csv in it `compare` and `diagnose` take both), or the "
-                                         "journal (.db) of a rig's session; -: "
-                                         "stdin; with "
-                                         "--server "
-                                         "also a stored session's name")
-      ->required(options->set_required);
+  if (options->takes_sets) {
+    CLI::Option* set = add_input(
+        options->set_name, options->sets, "",
+        !options->set_text.empty()
+            ? options->set_text
+            : absl::StrCat(
+                  "The measurement file (CSV), the folder of photographs (images.csv, camera.yaml and PNG "
+                  "files; with a touches.csv in it `compare` and `diagnose` take both), or the journal "
+                  "(.db) of a rig's session; -: stdin; with --server also a stored session's name",
+                  options->max_sets > 1 ? ". Of touches, several: sessions of one rig, in the order "
+                                          "in which they were made"
+                                        : ""));
+    set->required(options->set_required)->expected(options->set_required ? 1 : 0, options->max_sets);
+  }
   CLI::Option* model = add_input(
       "--model", options->models, "MODEL",
       options->max_models > 1
@@ -284,56 +316,79 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
         model::ParseModel(service::AsModelFile(text), path, effects::Catalogue()).status());
     evidence.add_also_yaml(text);
   }
-  TOUCHSTONE_ASSIGN_OR_RETURN(NamedSet set, ReadSet(cli, options.set));
-  const bool served = !cli.source().servers.empty();
-  std::vector<source::MeshSpec> meshes;
-  if (set.session.empty()) {
-    evidence.set_origin(options.set == "-" ? "stdin"
-                        : set.images       ? (fs::path(options.set) / session::kTouchesCsv).string()
-                                           : options.set);
-    if (set.images || !cli.source().meshes.empty() || !cli.source().mesh_folder.empty()) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsOf(evidence.origin(), &set));
-      TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
+  std::vector<NamedSet> sets;
+  for (const std::string& text : options.sets) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(sets.emplace_back(), ReadSet(cli, text));
+    if (sets.size() > 1) {
+      if (sets[0].images || sets.back().images)
+        return absl::InvalidArgumentError(
+            "SET: several sets are sessions of touches; photographs are diagnosed one folder at a time");
+      comparison->further_.emplace_back().set_origin(OriginOf(text, sets.back()));
     }
+  }
+  evidence.set_origin(OriginOf(options.set(), sets[0]));
+  const bool served = !cli.source().servers.empty();
+  // Meshes of a stored session's objects are looked up once the server has said which these are.
+  std::vector<std::string> objects;
+  const bool has_meshes = !cli.source().meshes.empty() || !cli.source().mesh_folder.empty();
+  for (size_t i = 0; i < sets.size(); ++i) {
+    if (!sets[i].session.empty() || !(sets[i].images || has_meshes)) continue;
+    const std::string origin = i == 0 ? evidence.origin() : comparison->further_[i - 1].origin();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> own, ObjectsOf(origin, &sets[i]));
+    AddObjects(own, &objects);
+  }
+  std::vector<source::MeshSpec> meshes;
+  const bool stored =
+      std::any_of(sets.begin(), sets.end(), [](const NamedSet& set) { return !set.session.empty(); });
+  if (!objects.empty() && !stored) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(comparison->connection_,
                               cli.ConnectWithMeshes(served ? std::vector<source::MeshSpec>() : meshes));
-  if (!set.session.empty()) {
-    evidence.set_session(set.session);
-    v1::GetSessionRequest request;
-    request.set_name(set.session);
-    const absl::StatusOr<v1::Session> session =
-        comparison->connection_->Call(&v1::Sessions::Stub::GetSession, request);
-    if (absl::IsNotFound(session.status()))
-      return absl::NotFoundError(
-          absl::StrCat("SET: ", options.set, " is no file, and at the server ", session.status().message()));
-    TOUCHSTONE_RETURN_IF_ERROR(session.status());
-    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, {session->objects().begin(), session->objects().end()},
-                                                 options.further_meshes));
+  if (stored) {
+    for (const NamedSet& set : sets) {
+      if (set.session.empty()) continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> own,
+                                  comparison->ObjectsOfStored(set.session));
+      AddObjects(own, &objects);
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
   }
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
-  if (set.images) {
-    comparison->set_sha256_ = set.images_sha256;
-    TOUCHSTONE_RETURN_IF_ERROR(comparison->AddImages(*std::move(set.images)));
-    if (set.csv.empty()) {
-      comparison->meshes_ = std::move(meshes);
-      return comparison;
-    }
-  } else if (!set.csv.empty()) {
-    comparison->set_sha256_ = Sha256Hex(set.csv);
-  }
   comparison->meshes_ = std::move(meshes);
-  if (!set.session.empty()) return comparison;
-  if (set.measured.has_value()) {
-    *evidence.mutable_set() = service::ToProto(*set.measured);
-    if (evidence.set().ByteSizeLong() <= kMaxInline) return comparison;
-    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, JournalCsv(options.set, ""));
+  NamedSet& first = sets[0];
+  if (!first.csv.empty() && !first.images) comparison->set_sha256_ = Sha256Hex(first.csv);
+  if (first.images) {
+    comparison->set_sha256_ = first.images_sha256;
+    TOUCHSTONE_RETURN_IF_ERROR(comparison->AddImages(*std::move(first.images)));
+    if (first.csv.empty()) return comparison;
   }
-  if (set.csv.size() > kMaxInline)
-    comparison->csv_to_send_ahead_ = std::move(set.csv);
-  else
-    evidence.set_csv(std::move(set.csv));
+  TOUCHSTONE_RETURN_IF_ERROR(SetMeasurements(options.set(), &first, &evidence));
+  comparison->csv_to_send_ahead_ = std::move(first.csv);
+  size_t bytes = evidence.ByteSizeLong();
+  for (size_t i = 1; i < sets.size(); ++i) {
+    v1::Evidence& further = comparison->further_[i - 1];
+    TOUCHSTONE_RETURN_IF_ERROR(SetMeasurements(options.sets[i], &sets[i], &further));
+    bytes += further.ByteSizeLong() + sets[i].csv.size();
+    if (!sets[i].csv.empty() || bytes > static_cast<size_t>(client::kMaxMessageBytes))
+      return absl::InvalidArgumentError(absl::StrCat(
+          "SET: with ", options.sets[i], " the sessions have ", bytes >> 20,
+          " MiB, too much for one request (", client::kMaxMessageBytes >> 20, " MiB, and ", kMaxInline >> 20,
+          " MiB of one session after the first); give stored sessions of a --server (`touchstone session "
+          "import`), or fewer"));
+  }
   return comparison;
+}
+
+absl::StatusOr<std::vector<std::string>> Comparison::ObjectsOfStored(const std::string& session) {
+  v1::GetSessionRequest request;
+  request.set_name(session);
+  const absl::StatusOr<v1::Session> stored = connection_->Call(&v1::Sessions::Stub::GetSession, request);
+  if (absl::IsNotFound(stored.status()))
+    return absl::NotFoundError(
+        absl::StrCat("SET: ", session, " is no file, and at the server ", stored.status().message()));
+  TOUCHSTONE_RETURN_IF_ERROR(stored.status());
+  return std::vector<std::string>(stored->objects().begin(), stored->objects().end());
 }
 
 Comparison::~Comparison() {

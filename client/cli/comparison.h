@@ -22,8 +22,11 @@ inline constexpr char kPlanText[] =
     "times are not read; "
     "-: stdin";
 
+inline constexpr int kMaxSessions = 100;  // in one request
+
 struct ComparisonOptions {
-  std::string set;
+  std::vector<std::string> sets;  // at most `max_sets`
+  int max_sets = 1;
   std::vector<std::string> models;  // at most `max_models`
   int max_models = 1;
   std::vector<std::string> also;
@@ -31,9 +34,11 @@ struct ComparisonOptions {
   std::string html;
   std::string json;
   bool set_required = true;
+  bool takes_sets = true;                  // false: the command finds the sets by itself
   std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
+  std::string set() const { return sets.empty() ? "" : sets[0]; }
   std::string model() const { return models.empty() ? "" : models[0]; }
   // What goes to standard output takes the place of the report in words.
   bool ReportOnStdout() const { return IsStandardOutput(json) || IsStandardOutput(html); }
@@ -58,6 +63,8 @@ class Comparison {
   const v1::Evidence& evidence() const { return evidence_; }
   // The second of two models, read and checked; none if one was given.
   const std::optional<v1::ModelRef>& other_model() const { return other_model_; }
+  // Sets after the first, as requests take them.
+  const std::vector<v1::Evidence>& further() const { return further_; }
 
   // Sends what Run would send ahead, so that evidence() is whole. Run does it by itself.
   absl::Status SendAheadNow() { return sent_ahead_.empty() ? SendAhead() : absl::OkStatus(); }
@@ -69,6 +76,7 @@ class Comparison {
 
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
+  absl::StatusOr<std::vector<std::string>> ObjectsOfStored(const std::string& session);
   absl::Status SendMeshes(const std::vector<source::MeshSpec>& meshes);
   absl::Status AddImages(v1::ImageSetFiles images);
   // What is too large for one request goes ahead as a session, once to each server that is asked.
@@ -80,6 +88,7 @@ class Comparison {
   std::unique_ptr<client::Connection> connection_;
   v1::Evidence evidence_;
   std::optional<v1::ModelRef> other_model_;
+  std::vector<v1::Evidence> further_;
   std::string csv_to_send_ahead_;
   std::string sent_ahead_;                // the session's name
   std::string set_sha256_;                // of the set's file; empty: it is none here

@@ -61,6 +61,14 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
 }
 
 absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
+  if (options.sets.size() > 1) {
+    for (const auto& [given, name] : {std::pair{options.with_formula, "--with-formula"},
+                                      std::pair{options.with_surface_map, "--with-surface-map"},
+                                      std::pair{!options.board.corners.empty(), "--board"}})
+      if (given)
+        return absl::InvalidArgumentError(
+            absl::StrCat(name, ": is for one SET, and ", options.sets.size(), " are given"));
+  }
   if (!options.board.corners.empty()) {
     for (const auto& [given, name] : {std::pair{options.with_formula, "--with-formula"},
                                       std::pair{options.with_surface_map, "--with-surface-map"},
@@ -94,11 +102,12 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   v1::DiagnoseRequest request;
   request.set_with_surface_map(options.with_surface_map);
   request.set_save_model(options.keep_as);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                return comparison->connection().diagnosis().Diagnose(context, request);
-                              }));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const v1::Report report, comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+        return comparison->connection().diagnosis().Diagnose(context, request);
+      }));
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
   if (!options.keep_as.empty()) cli.Log(absl::StrCat("the server keeps the model as ", options.keep_as));
   if (!options.save_model.empty()) return SaveModel(cli, options, report, comparison.get());
@@ -109,6 +118,7 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
 
 void AddDiagnose(Cli* cli) {
   auto options = std::make_shared<DiagnoseOptions>();
+  options->max_sets = kMaxSessions;
   options->further_meshes = true;  // one of them may be what was touched
   CLI::App* command = cli->AddCommand(
       nullptr, "diagnose",
@@ -123,6 +133,7 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --save-model better.yaml "
       "--with-surface-map\n"
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --also my_effect.yaml\n"
+      "touchstone diagnose monday.csv friday.csv --model nominal.yaml --mesh-dir meshes   what changed\n"
       "touchstone diagnose photos --model nominal.yaml --mesh-dir meshes --html report.html\n"
       "touchstone diagnose photos --board 9x6 --square-mm 25 --save-model lens.yaml\n"
       "touchstone diagnose photos --board 9x6 --square-mm 25 --save-camera camera.yaml\n"

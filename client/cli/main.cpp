@@ -26,6 +26,7 @@ void AddCommands(Cli* cli) {
   AddCompare(cli);
   AddDiagnose(cli);
   AddExplain(cli);
+  AddHistory(cli);
   AddCheck(cli);
   AddRehearse(cli);
   AddPropose(cli);

@@ -95,6 +95,8 @@ std::vector<OutputCase> Cases() {
        {"set.csv"},
        false},
       {"ExplainAsJson", {"explain", "tip_radius", "set.csv", "--json", "OUT"}, ".json", {"set.csv"}, false},
+      {"HistoryAsJson", {"history", ".", "--json", "OUT"}, ".json", {}, false},
+      {"HistoryAsHtml", {"history", ".", "--html", "OUT"}, ".html", {}, false},
       {"RehearseAsJson", {"rehearse", "set.csv", "--json", "OUT"}, ".json", {"set.csv"}, false},
       {"Propose", {"propose", "set.csv", "-o", "OUT"}, ".csv", {"set.csv"}, false},
       {"ProposeAsJson", {"propose", "set.csv", "--json", "OUT"}, ".json", {"set.csv"}, false},

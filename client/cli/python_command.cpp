@@ -60,6 +60,10 @@ const std::vector<PythonCommand>& PythonCommands() {
       {"recover", "Saves what is whole of a file that a kill or a full disk cut, and says what that is.",
        "touchstone.formats", "recover", "touchstone-sim[formats]",
        "--out -o --force --json --quiet -q --help -h"},
+      {"worth", "Says what a better model is worth to your recogniser, on measured touches, with intervals.",
+       "touchstone.training.worth", "", "touchstone-training",
+       "--model --better --train --fitted --mesh --mesh-dir --server --samples --touches --poses --seeds "
+       "--seed --figure --force --json --quiet -q --help -h"},
   };
   return commands;
 }
@@ -95,6 +99,9 @@ absl::Status BecomePythonCommand(const PythonCommand& command, const std::vector
   raw.push_back(nullptr);
   // Modules that need this program, to read a journal, find it there.
   ::setenv("TOUCHSTONE_PROGRAM", PathBesideThisProgram("touchstone").c_str(), /*overwrite=*/1);
+  // A module that starts a server takes the one of this program.
+  const std::string server = PathBesideThisProgram("touchstone-server");
+  if (::access(server.c_str(), X_OK) == 0) ::setenv("TOUCHSTONE_SERVER", server.c_str(), /*replace=*/0);
   std::fflush(stdout);
   ::execv(raw[0], raw.data());
   return absl::NotFoundError(absl::StrCat(*python, " cannot be started: ", std::strerror(errno)));

@@ -44,6 +44,15 @@ TEST_F(PythonCommandTest, TheModuleGetsEveryWord) {
   EXPECT_EQ(Run({"import"}).out, "['import']\n");
 }
 
+TEST_F(PythonCommandTest, TheModuleFindsTheServerOfThisProgram) {
+  Module("import os\nprint(os.environ.get('TOUCHSTONE_SERVER'))\n");
+  ::unsetenv("TOUCHSTONE_SERVER");
+  EXPECT_THAT(Run({"export"}).out, ::testing::EndsWith("/bin/touchstone-server\n"));
+  ::setenv("TOUCHSTONE_SERVER", "/another/server", 1);
+  EXPECT_EQ(Run({"export"}).out, "/another/server\n");
+  ::unsetenv("TOUCHSTONE_SERVER");
+}
+
 TEST_F(PythonCommandTest, HelpIsThatOfTheModule) {
   EXPECT_EQ(Run({"export", "--help"}).out, "['export', '--help']\n");
   EXPECT_EQ(Run({"help", "export"}).out, "['export', '--help']\n");
@@ -62,6 +71,9 @@ TEST_F(PythonCommandTest, ItIsListedSuggestedAndCompleted) {
 
 TEST_F(PythonCommandTest, InterruptionEndsTheModule) {
   Module("import signal\nopen('started', 'w').close()\nwhile True:\n    signal.pause()\n");
+  ::signal(
+      SIGINT,
+      SIG_DFL);  // which tests that a shell runs in the background would ignore, and the module with them
   for (const int signal : {SIGINT, SIGTERM}) {
     std::filesystem::remove(Path("started"));
     const pid_t child = Start({"export"});

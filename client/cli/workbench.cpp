@@ -45,13 +45,13 @@ absl::Status RunWorkbench(const Cli& cli, const WorkbenchFlags& options) {
   if (options.port < 0 || options.port > kMaxPort)
     return absl::InvalidArgumentError(
         absl::StrCat("--port: ", options.port, " is out of range; 0 to ", kMaxPort));
-  if (options.set.empty() && !options.models.empty())
+  if (options.sets.empty() && !options.models.empty())
     return absl::InvalidArgumentError(
         "--model: the model of what measurements? Give SET, for instance set.csv");
   std::unique_ptr<Comparison> comparison;
   std::unique_ptr<client::Connection> alone;
   workbench::WorkbenchOptions served;
-  if (options.set.empty()) {
+  if (options.sets.empty()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(alone, cli.Connect());
   } else {
     TOUCHSTONE_ASSIGN_OR_RETURN(comparison, Comparison::Open(cli, options));

@@ -26,6 +26,15 @@ std::string Falls(const ErrorScale& scale, double from, double to) {
   return absl::StrCat("the error falls from ", scale.Text(from), " to ", scale.Text(to));
 }
 
+// Of several sessions the errors are those of the one whose model is saved.
+std::string InSession(const v1::Report& report) {
+  if (!report.has_sessions()) return "";
+  const v1::DataReport& main = MainData(report);
+  for (int s = 0; s < report.data_size(); ++s)
+    if (&report.data(s) == &main) return absl::StrCat(" in ", SessionLabel(report, s));
+  return "";
+}
+
 // A step that says nothing of single touches (a surface error) leaves the error where it was.
 bool FallsAtAll(const ErrorScale& scale, double from, double to) {
   return scale.Text(from) != scale.Text(to) && to < from;
@@ -64,9 +73,10 @@ std::string Compared(const v1::Report& report) {
   if (AgreesToRounding(data)) return "The model agrees with the data to the rounding of files and meshes.";
   if (!(rmse > 0)) return "Nothing could be compared.";
   const Floor floor = NoiseFloorOf(data);
-  if (!(floor.sigma > 0)) return absl::StrCat("The model is off by ", scale.Text(rmse), ".");
+  if (!(floor.sigma > 0))
+    return absl::StrCat("The model is off by ", scale.Text(rmse), InSession(report), ".");
   return absl::StrCat("The model is off by ", scale.Text(rmse), ", ", Number(rmse / floor.sigma, 2),
-                      " times the noise floor.");
+                      " times the noise floor", InSession(report), ".");
 }
 
 std::string Unexplained(const v1::Report& report) {
@@ -131,7 +141,8 @@ std::string WrongValues(const v1::Report& report) {
   if (IsJoint(report) && !FallsOfBoth(report).empty())
     return absl::StrCat(what, ": put right, the error ", FallsOfBoth(report), ".");
   return absl::StrCat(
-      what, FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "", ".");
+      what, FallsAtAll(scale, from, to) ? absl::StrCat(": put right, ", Falls(scale, from, to)) : "",
+      InSession(report), ".");
 }
 
 std::string MissingEffects(const v1::Report& report) {
@@ -158,7 +169,7 @@ std::string MissingEffects(const v1::Report& report) {
   const Floor floor = NoiseFloorOf(data);
   const bool reached = floor.sigma > 0 && to <= 1.05 * floor.sigma;
   return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(scale, from, to),
-                      reached ? ", the noise floor." : ".");
+                      reached ? ", the noise floor" : "", InSession(report), ".");
 }
 
 }  // namespace
@@ -188,6 +199,9 @@ std::string Headline(const v1::Report& report) {
       if (!FingerScatterWords(report).empty())
         return absl::StrCat("No effect on the mean is missing, but the fingers do not scatter alike: ",
                             FingerScatterWords(report), ".");
+      if (report.has_sessions())
+        return absl::StrCat("Nothing is missing and nothing changed: ", model,
+                            " is as good as the touches of ", report.data_size(), " sessions can tell.");
       return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(MainData(report).count()),
                           " ", ErrorScale(MainData(report)).readings(), " can tell.");
     case v1::Report::WRONG_VALUES:

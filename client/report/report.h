@@ -17,6 +17,8 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour);
 
 // The same of a check: what a plan can find.
 std::string TerminalCheck(const v1::Report& report, int width, bool colour);
+// Several sessions one after another: the error of each, and a control chart of every value.
+std::string TerminalHistory(const v1::Report& report, int width, bool colour);
 // The same of an explanation: why (not) one effect.
 std::string TerminalExplanation(const v1::Report& report, int width, bool colour);
 

@@ -14,6 +14,7 @@ void AddWhatToDo(const v1::Report& report, TextLayout* out);
 void AddNext(const v1::Report& report, TextLayout* out);        // touches to make, pictures to take
 void AddBlindSpots(const v1::Report& report, TextLayout* out);  // effects that the set could not have shown
 void AddVersus(const v1::Report& report, TextLayout* out);      // a comparison with a second model
+void AddSessions(const v1::Report& report, TextLayout* out);    // several sessions: in place of "How wrong"
 // Of photographs.
 void AddSilhouettes(const v1::Report& report, TextLayout* out);       // lines of "How wrong"
 void AddWorstPhotographs(const v1::Report& report, TextLayout* out);  // the pictures that are off most

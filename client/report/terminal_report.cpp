@@ -51,10 +51,19 @@ void AddHowWrong(const v1::Report& report, TextLayout* out) {
   }
 }
 
+// The entries that are told of: of several sessions the one whose model is saved.
+std::vector<const v1::DataReport*> ShownData(const v1::Report& report) {
+  if (report.has_sessions()) return {&MainData(report)};
+  std::vector<const v1::DataReport*> shown;
+  for (const v1::DataReport& data : report.data()) shown.push_back(&data);
+  return shown;
+}
+
 void AddWhere(const v1::Report& report, TextLayout* out) {
   std::vector<std::vector<TextCell>> rows;
   size_t widest = 0;
-  for (const v1::DataReport& data : report.data()) {
+  for (const v1::DataReport* shown : ShownData(report)) {
+    const v1::DataReport& data = *shown;
     const ErrorScale scale(data);
     for (const v1::Slice& slice : data.where()) {
       if (rows.size() == 6) break;
@@ -79,8 +88,8 @@ void AddWhere(const v1::Report& report, TextLayout* out) {
 // Whether the fingers' residuals depend on the place in the session, with the given and with the improved model.
 void AddSession(const v1::Report& report, TextLayout* out) {
   std::vector<const v1::CovariateCurve*> curves;
-  for (const v1::DataReport& data : report.data())
-    for (const v1::CovariateCurve* curve : SessionCurves(data)) curves.push_back(curve);
+  for (const v1::DataReport* data : ShownData(report))
+    for (const v1::CovariateCurve* curve : SessionCurves(*data)) curves.push_back(curve);
   if (curves.empty()) return;
   const bool improved = !report.improved_model_yaml().empty();
   double smallest = 1;
@@ -152,7 +161,10 @@ void AddLadder(const v1::Report& report, TextLayout* out) {
 std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
   AddOpening(report, &out);
-  AddHowWrong(report, &out);
+  if (report.has_sessions())
+    AddSessions(report, &out);
+  else
+    AddHowWrong(report, &out);
   AddVersus(report, &out);
   AddDataProblems(report, &out);
   AddJoint(report, &out);

@@ -16,6 +16,7 @@
 #include <absl/strings/strip.h>
 
 #include "client/report/error_scale.h"
+#include "server/base/file_label.h"
 #include "server/base/units.h"
 
 namespace touchstone::client {
@@ -194,6 +195,10 @@ std::string StepName(const v1::Step& step) {
 
 const v1::DataReport& MainData(const v1::Report& report) {
   const auto& data = report.data();
+  // The model that is saved is that of the last session with enough touches.
+  if (report.has_sessions())
+    for (int s = data.size() - 1; s >= 0; --s)
+      if (data[s].needed() == 0) return data[s];
   const auto pictures = std::find_if(data.begin(), data.end(), [](const v1::DataReport& one) {
     return one.kind() == v1::DataReport::PHOTOGRAPHS;
   });
@@ -207,7 +212,7 @@ const v1::DataReport& DataOf(const v1::Report& report, const v1::DataProblem& pr
 }
 
 bool IsJoint(const v1::Report& report) {
-  return report.data_size() > 1 &&
+  return report.data_size() > 1 && !report.has_sessions() &&
          std::all_of(report.data().begin(), report.data().end(),
                      [](const v1::DataReport& data) { return data.initial().rmse() > 0; });
 }
@@ -339,11 +344,18 @@ bool IsOfPlan(const v1::Report& report) {
   return report.verdict() == v1::Report::VERDICT_UNSPECIFIED && !report.detectable().empty();
 }
 
+std::string SessionLabel(const v1::Report& report, int session) {
+  std::vector<std::string> paths;
+  for (const v1::DataReport& data : report.data()) paths.push_back(data.session());
+  return FileLabel(paths, session);
+}
+
 std::string DataInWords(const v1::Report& report, const std::string& times) {
   std::string text;
+  if (report.has_sessions()) absl::StrAppend(&text, report.data_size(), " sessions: ");
   for (const v1::DataReport& data : report.data())
-    absl::StrAppend(&text, text.empty() ? "" : " and ", Count(data.count()), " ",
-                    ErrorScale(data).Counted(data.count()));
+    absl::StrAppend(&text, text.empty() || absl::EndsWith(text, ": ") ? "" : " and ", Count(data.count()),
+                    " ", ErrorScale(data).Counted(data.count()));
   if (report.data().empty()) return "0 touches";
   // Of a joint report the touches' set.
   const v1::DataSummary& set = report.data(0).set();

@@ -120,6 +120,9 @@ std::string NothingMissingWords(const v1::Report& report);
 // The verdict in one sentence.
 std::string Headline(const v1::Report& report);
 
+// What a session of several is called (FileLabel).
+std::string SessionLabel(const v1::Report& report, int session);
+
 // "960 touches, 5 objects, 240 poses x 4 rounds", of all entries; `times` is the sign between poses and rounds.
 std::string DataInWords(const v1::Report& report, const std::string& times);
 

@@ -5,6 +5,7 @@
 #include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/photograph_reports.h"
 #include "server/diagnosis/plan_reports.h"
+#include "server/diagnosis/session_reports.h"
 #include "server/diagnosis/touch_reports.h"
 
 namespace touchstone::diagnosis {
@@ -21,6 +22,16 @@ absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const Dia
 absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context) {
   if (input.images == nullptr) return DiagnoseTouches(input, context);
   return input.set == nullptr ? DiagnosePhotographSet(input, context) : DiagnoseJointSet(input, context);
+}
+
+absl::StatusOr<report::Diagnosis> Compare(const std::vector<DiagnosisInput>& sessions,
+                                          const DiagnosisContext& context) {
+  return sessions.size() == 1 ? Compare(sessions[0], context) : CompareSessions(sessions, context);
+}
+
+absl::StatusOr<report::Diagnosis> Diagnose(const std::vector<DiagnosisInput>& sessions,
+                                           const DiagnosisContext& context) {
+  return sessions.size() == 1 ? Diagnose(sessions[0], context) : DiagnoseSessions(sessions, context);
 }
 
 absl::StatusOr<report::Diagnosis> Propose(const DiagnosisInput& input, int max_measurements,

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <absl/status/statusor.h>
 
@@ -19,9 +20,15 @@ namespace touchstone::diagnosis {
 
 // How wrong and where; with a second model, of touches only, which of the two errs less. The verdict is kNone.
 absl::StatusOr<report::Diagnosis> Compare(const DiagnosisInput& input, const DiagnosisContext& context);
+// The same of several sessions (session_reports.h).
+absl::StatusOr<report::Diagnosis> Compare(const std::vector<DiagnosisInput>& sessions,
+                                          const DiagnosisContext& context);
 
 // Also why, what to add, and what the error becomes.
 absl::StatusOr<report::Diagnosis> Diagnose(const DiagnosisInput& input, const DiagnosisContext& context);
+// The same of several sessions, and which values they share: Diagnosis::sessions.
+absl::StatusOr<report::Diagnosis> Diagnose(const std::vector<DiagnosisInput>& sessions,
+                                           const DiagnosisContext& context);
 
 // Diagnose, with at most `max_measurements` further touches, or pictures, that would tell the explanations that are left
 // apart, or improve the values where only one is left. Of touches or of photographs: INVALID_ARGUMENT for both.

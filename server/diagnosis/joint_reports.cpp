@@ -16,15 +16,6 @@
 namespace touchstone::diagnosis {
 namespace {
 
-// The model with the effects of photographs alone.
-model::Model PhotographPartOf(const model::Model& model) {
-  model::Model part = model;
-  part.effects.clear();
-  for (const model::EffectInstance& instance : model.effects)
-    if (instance.effect->of_photos()) part.effects.push_back(instance);
-  return part;
-}
-
 // A stretch of the progress of the whole.
 DiagnosisContext Stretch(const DiagnosisContext& context, double from, double to) {
   DiagnosisContext part = context;
@@ -182,8 +173,8 @@ class JointDiagnoser {
   // The effects of touches of the one model, those of photographs of the other.
   model::Model Both(const model::Model& touches, const model::Model& photographs) const {
     model::Model both = selection::TouchPartOf(touches);
-    const model::Model of_pictures = PhotographPartOf(photographs);
-    both.effects.insert(both.effects.end(), of_pictures.effects.begin(), of_pictures.effects.end());
+    const std::vector<model::EffectInstance> of_pictures = selection::PhotographEffectsOf(photographs);
+    both.effects.insert(both.effects.end(), of_pictures.begin(), of_pictures.end());
     both.name = input_.model->name.empty() ? "" : input_.model->name + "_better";
     return both;
   }

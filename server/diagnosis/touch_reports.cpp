@@ -70,9 +70,8 @@ double Now() {
 // The model's effects of photographs are no business of touches: a diagnosis works without them, and they come back
 // as they were into every model that it gives.
 struct PhotographEffects {
-  explicit PhotographEffects(const DiagnosisInput& input) : touches(input), given(input.model) {
-    for (const model::EffectInstance& instance : input.model->effects)
-      if (instance.effect->of_photos()) effects.push_back(instance);
+  explicit PhotographEffects(const DiagnosisInput& input)
+      : touches(input), given(input.model), effects(selection::PhotographEffectsOf(*input.model)) {
     if (!effects.empty())
       touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
   }

@@ -29,6 +29,11 @@ struct Work {
                                            const diagnosis::DiagnosisContext&)>
       run;
   TimesOfSet times = TimesOfSet::kNeeded;
+  // Of several sessions, the first among them; in the place of `run`.
+  std::function<absl::StatusOr<v1::Report>(const std::vector<diagnosis::DiagnosisInput>&,
+                                           const diagnosis::DiagnosisContext&)>
+      run_sessions = nullptr;
+  google::protobuf::RepeatedPtrField<v1::Evidence> further = {};
 };
 absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diagnosis>& diagnosis) {
   if (!diagnosis.ok()) return diagnosis.status();
@@ -36,6 +41,7 @@ absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diag
 }
 
 constexpr std::chrono::milliseconds kProgressInterval{250};
+constexpr int kMaxFurther = 99;  // sessions beside the first
 constexpr int kDefaultProposedTouches = 24, kDefaultProposedPhotographs = 12;
 
 // Nothing catches what leaves a thread: the process would end, and with it what other clients do.
@@ -106,19 +112,39 @@ class Worker {
   std::thread thread_;  // last: it uses the others
 };
 
+// Hash of the set, as a file; empty: it came as columns.
+std::string HashOfSet(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input,
+                      const Resources& resources) {
+  if (evidence.measurements_case() == v1::Evidence::kCsv) return Sha256Hex(evidence.csv());
+  if (evidence.measurements_case() == v1::Evidence::kSession) {
+    const auto session = resources.sessions->Find(evidence.session());
+    return session.ok() ? session->hash() : "";
+  }
+  return input.images != nullptr && input.set == nullptr ? input.images->sha256 : "";
+}
+
+// A further session under the model and with the meshes of the first.
+v1::Evidence SessionOf(const v1::Evidence& first, const v1::Evidence& further) {
+  v1::Evidence session = first;
+  session.clear_images();
+  if (further.measurements_case() == v1::Evidence::kCsv)
+    session.set_csv(further.csv());
+  else if (further.measurements_case() == v1::Evidence::kSet)
+    *session.mutable_set() = further.set();
+  else if (further.measurements_case() == v1::Evidence::kSession)
+    session.set_session(further.session());
+  else
+    session.clear_measurements();
+  session.set_origin(further.origin());
+  return session;
+}
+
 // What went in, by its hashes. A set that came as columns is no file: only the client knows where they are from.
 void AddProvenance(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input,
                    const Resources& resources, v1::Report* report) {
   v1::Provenance* provenance = report->mutable_provenance();
   provenance->set_seed(input.seed);
-  if (evidence.measurements_case() == v1::Evidence::kCsv)
-    provenance->set_set_sha256(Sha256Hex(evidence.csv()));
-  if (evidence.measurements_case() == v1::Evidence::kSession) {
-    if (const auto session = resources.sessions->Find(evidence.session()); session.ok())
-      provenance->set_set_sha256(session->hash());
-  } else if (input.images != nullptr && input.set == nullptr) {
-    provenance->set_set_sha256(input.images->sha256);
-  }
+  provenance->set_set_sha256(HashOfSet(evidence, input, resources));
   std::vector<std::string> objects;
   if (input.set != nullptr) objects = input.set->objects;
   if (input.images != nullptr)
@@ -145,8 +171,24 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources, work.times));
-        TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work.run(input, how));
+        if (work.further.empty()) {
+          TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work.run(input, how));
+          AddProvenance(evidence, input, *resources, &report);
+          return report;
+        }
+        if (work.further.size() > kMaxFurther)
+          return absl::InvalidArgumentError(
+              absl::StrCat("further has ", work.further.size(), " sessions: at most ", kMaxFurther));
+        std::vector<diagnosis::DiagnosisInput> sessions = {input};
+        std::vector<std::string> hashes = {HashOfSet(evidence, input, *resources)};
+        for (const v1::Evidence& further : work.further) {
+          const v1::Evidence session = SessionOf(evidence, further);
+          TOUCHSTONE_ASSIGN_OR_RETURN(sessions.emplace_back(), ReadEvidence(session, *resources, work.times));
+          hashes.push_back(HashOfSet(session, sessions.back(), *resources));
+        }
+        TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report, work.run_sessions(sessions, how));
         AddProvenance(evidence, input, *resources, &report);
+        *report.mutable_provenance()->mutable_session_sha256() = {hashes.begin(), hashes.end()};
         return report;
       },
       resources->pool.get());
@@ -214,12 +256,18 @@ grpc::Status DiagnosisService::Compare(grpc::ServerContext* context, const v1::C
           absl::Status(read.status().code(), absl::StrCat("other_model: ", read.status().message())));
     other = *std::move(read);
   }
-  const Work work = {[&other](const diagnosis::DiagnosisInput& input,
-                              const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+  Work work;
+  work.run = [&other](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
     diagnosis::DiagnosisInput asked = input;
     asked.other_model = other;
     return AsReport(touchstone::diagnosis::Compare(asked, how));
-  }};
+  };
+  work.run_sessions = [&other](std::vector<diagnosis::DiagnosisInput> sessions,
+                               const diagnosis::DiagnosisContext& how) {
+    sessions[0].other_model = other;
+    return AsReport(touchstone::diagnosis::Compare(sessions, how));
+  };
+  work.further = request->further();
   const absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   for (const v1::DataReport& data : report.data())
     if (status.ok() && data.kind() == v1::DataReport::TOUCHES && data.initial().rmse() > 0)
@@ -239,13 +287,21 @@ grpc::Status DiagnosisService::Diagnose(grpc::ServerContext* context, const v1::
       return ToGrpc(absl::Status(status.code(), absl::StrCat("save_model: ", status.message())));
   }
   v1::Report report;
-  const Work work = {[with_surface_map = request->with_surface_map()](
-                         const diagnosis::DiagnosisInput& input,
-                         const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
+  if (request->with_surface_map() && !request->further().empty())
+    return ToGrpc(absl::InvalidArgumentError(
+        "with_surface_map: is for one session; leave it out, or diagnose one session by itself"));
+  Work work;
+  work.run = [with_surface_map = request->with_surface_map()](const diagnosis::DiagnosisInput& input,
+                                                              const diagnosis::DiagnosisContext& how) {
     diagnosis::DiagnosisInput asked = input;
     asked.with_surface_map = with_surface_map;
     return AsReport(touchstone::diagnosis::Diagnose(asked, how));
-  }};
+  };
+  work.run_sessions = [](const std::vector<diagnosis::DiagnosisInput>& sessions,
+                         const diagnosis::DiagnosisContext& how) {
+    return AsReport(touchstone::diagnosis::Diagnose(sessions, how));
+  };
+  work.further = request->further();
   absl::Status status = RunAndSend(context, request->evidence(), work, resources_, writer, &report);
   // The report is sent even if the model cannot be kept.
   if (status.ok() && !name.empty()) status = SaveModel(report, *request, resources_);

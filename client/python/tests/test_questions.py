@@ -71,3 +71,42 @@ def test_a_report_of_a_set_says_what_it_could_not_have_shown(client, measured):
     assert "speed_error" not in {value.effect for value in report.detectable}  # found
     assert any(value.power_at_typical < 0.8 for value in report.detectable)
     assert np.isfinite([value.std_error for value in report.detectable]).all()
+
+
+@pytest.fixture(scope="module")
+def sessions(client, tmp_path_factory):
+    """Two sessions of one rig on the same poses: its arm is 8 % too fast in the second one."""
+    folder = tmp_path_factory.mktemp("sessions")
+    touches = client.plan(touchstone.faces(samples_per_face=4, rounds=3), "lat20", count=72)
+    for seed, (name, model) in enumerate({"monday": NOMINAL, "friday": HIDDEN}.items()):
+        times_us = client.touch("lat20", touches, model=model, seed=seed)["contact_time_us"]
+        touchstone.write_measurements(folder / f"{name}.csv", [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(times_us[k]))
+                                                               for k in range(len(touches))])
+    return [folder / "monday.csv", folder / "friday.csv"]
+
+
+def test_what_changed_between_sessions_is_named(client, sessions):
+    report = client.diagnose(sessions, NOMINAL)
+    assert [data.session for data in report.data] == list(map(str, sessions))
+    changed = [value for value in report.sessions.values if value.change == "changed"]
+    assert [value.effect for value in changed] == [report.steps[0].effect]
+    low, high = changed[0].interval
+    assert low < changed[0].difference < high and set(changed[0].by_session) == {0, 1}
+    assert "friday.csv" in report.sessions.words
+    assert report.sessions.models[0] != report.sessions.models[1]
+    assert report.data[1].final.rmse < 0.5 * report.data[1].initial.rmse
+    assert "changed" in report.sessions.values._repr_html_()
+
+
+def test_sessions_that_differ_are_told_without_a_fit(client, sessions):
+    report = client.compare(sessions, NOMINAL)
+    same, = report.sessions.message.same_poses
+    assert same.poses > 20 and same.p < 1e-6 and not report.sessions.values
+    assert client.compare(sessions[0], NOMINAL).sessions is None
+
+
+def test_sessions_take_one_model(client, sessions):
+    with pytest.raises(touchstone.InvalidRequest, match="several sessions take one model"):
+        client.compare(sessions, NOMINAL, other_model=HIDDEN)
+    with pytest.raises(touchstone.InvalidRequest, match="empty list"):
+        client.diagnose([], NOMINAL)

@@ -40,7 +40,7 @@ def test_batches_have_the_promised_shapes_and_units(client):
     assert [b.start_index for b in batches] == [0, 300, 600, 900]
     first = batches[0]
     assert first["descriptor_us"].shape == (300, 3) and first["descriptor_us"].dtype == np.float32
-    assert first["object"].dtype == np.int32 and first["index"].dtype == np.uint64
+    assert first["object"].dtype == np.int64 and first["index"].dtype == np.uint64
     np.testing.assert_array_equal(joined(dataset, "index"), np.arange(1000))
     np.testing.assert_array_equal(joined(dataset, "object"), np.arange(1000) % 2)
     # One finger came first; the others are the same differences as in the full times.

@@ -47,7 +47,7 @@ def test_batches_are_tensors(server):
     first = next(iter(dataset(server, columns=("index", "object", "descriptor", "image"),
                               image=touchstone.image(20, 10, "rgb"))))
     assert first["descriptor_us"].dtype == torch.float32 and first["descriptor_us"].shape == (64, 3)
-    assert first["index"].dtype == torch.int64 and first["object"].dtype == torch.int32
+    assert first["index"].dtype == torch.int64 and first["object"].dtype == torch.int64
     assert first["image"].dtype == torch.uint8 and first["image"].shape == (64, 3, 10, 20)
 
 

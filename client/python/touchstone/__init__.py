@@ -14,7 +14,7 @@ import pkgutil
 # touchstone.training is a distribution of its own, with libraries that streaming does not need.
 __path__ = pkgutil.extend_path(__path__, __name__)
 
-from .batch import Batch, EncodedImages
+from .batch import Batch, Columns, EncodedImages
 from .box_touches import box_touches
 from .client import Client, connect
 from .credentials import Credentials
@@ -35,17 +35,19 @@ from .measurements import Row, read_plan, write_measurements
 from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
-from .report import DataReport, Detectable, Explanation, Quality, Report, Step, Value, Versus
+from .report import Report
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id
+from .tabular import Rows, Tabular
 from .version import __version__
 
 __all__ = [
-    "Batch", "Camera", "Client", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
+    "Batch", "Camera", "Client", "Columns", "ComparedValue", "Credentials", "DataReport", "Dataset", "Description", "Detectable", "Effect",
     "EncodedImages", "Explanation", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
-    "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Samples",
-    "Session", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "TouchCheck", "Touches",
+    "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Rows", "Samples",
+    "Session", "Sessions", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "Tabular", "TouchCheck", "Touches",
     "TouchstoneError", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",
     "sphere", "touch_id", "touches", "write_measurements",
 ]

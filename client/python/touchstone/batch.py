@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Union, overload
+from typing import Any, TypedDict, Union, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import errors, units
+from .errors import InvalidRequest
+from .tabular import Tabular
 from .v1 import types_pb2
 
 _DTYPES: dict[int, np.dtype[Any]] = {
@@ -84,11 +86,33 @@ def decode_column(column: types_pb2.Column, rows: int) -> Column:
     return np.frombuffer(data, dtype).reshape(shape)
 
 
-class Batch(Mapping[str, Any]):
+class Columns(TypedDict, total=False):
+    """What a batch may hold, in the units of labs; which of them depends on the dataset's `columns` and `image`."""
+
+    index: NDArray[np.uint64]
+    object: NDArray[np.int64]  # position in the dataset's objects
+    descriptor_us: NDArray[np.float32]  # (rows, fingers)
+    contact_time_us: NDArray[np.float32]  # (rows, fingers)
+    travel_mm: NDArray[np.float32]  # (rows, fingers)
+    target_mm: NDArray[np.float32]  # (rows, 3), as approach and lateral
+    approach: NDArray[np.float32]
+    lateral: NDArray[np.float32]
+    standoff_mm: NDArray[np.float32]
+    speed_mm_s: NDArray[np.float32]
+    contact_point_mm: NDArray[np.float32]  # (rows, fingers, 3), as normal
+    normal: NDArray[np.float32]
+    complete: NDArray[np.bool_]  # of Client.touch()
+    image: NDArray[np.uint8] | EncodedImages  # (rows, height, width, channels)
+    depth_mm: NDArray[np.float32]  # (rows, height, width), as mask
+    mask: NDArray[np.uint8]
+
+
+class Batch(Mapping[str, Any], Tabular):
     """Samples start_index .. start_index + rows - 1, or those of a list; `batch["descriptor_us"]` is an array of `rows` entries.
 
     Columns that need no conversion are read-only views of the received bytes; the others are converted when
-    they are first asked for. `batch["image"]` is uint8 (rows, height, width, channels), or EncodedImages.
+    they are first asked for. `batch["image"]` is uint8 (rows, height, width, channels), or EncodedImages. columns() has them
+    with their types, to_torch() as tensors.
 
     Attributes:
       start_index: index of the first sample.
@@ -134,7 +158,31 @@ class Batch(Mapping[str, Any]):
         wire_name = self._wire_names.pop(name, None)
         if wire_name is not None and isinstance(values, np.ndarray):
             values = self._columns[name] = units.lab_array(wire_name, values)
+            if name == "object":  # what indexing and PyTorch's losses want
+                values = self._columns[name] = values.astype(np.int64)
         return values
+
+    def columns(self) -> Columns:
+        """All of them, converted, by name."""
+        return cast(Columns, dict(self))
+
+    def to_torch(self) -> dict[str, Any]:
+        """Tensors of all columns without a copy: they share the memory of the arrays, also of those that are read-only here.
+        Images have the channels first; encoded ones stay a list of bytes. Needs PyTorch."""
+        from . import torch_support
+
+        return torch_support.tensors(self)
+
+    def _table(self) -> Mapping[str, Any]:
+        return self
+
+    def _draw(self, axes: Any) -> None:
+        name = next((name for name in self if name.startswith(("descriptor", "contact_time"))), None)
+        if name is None:
+            raise InvalidRequest(f"there is nothing to draw in {', '.join(self)}; ask for the column descriptor")
+        axes.plot(self.indices, self[name], marker=".", linestyle="")
+        axes.set(xlabel="sample", ylabel=name)
+        axes.legend([f"finger {k}" for k in range(self[name].shape[1])])
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._columns)

@@ -11,7 +11,7 @@ import grpc
 
 from . import checks, errors
 from .connection import Connection
-from .evidence import MeshesLike, evidence
+from .evidence import MeasurementsLike, MeshesLike, evidence, sessions
 from .models import ModelLike, model_ref
 from .report import Report
 from .retry import Retry
@@ -32,29 +32,34 @@ class Diagnosis:
     def __init__(self, connection: Connection):
         self._connection = connection
 
-    def compare(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
+    def compare(self, measurements: MeasurementsLike, model: ModelLike = None, *, meshes: MeshesLike = None,
                 other_model: ModelLike = None, on_progress: OnProgress | None = None) -> Report:
-        """How wrong the model is, and where; changes nothing. With another model, of touches: report.versus says which errs less."""
-        request = diagnosis_pb2.CompareRequest(evidence=evidence(measurements, model, meshes, (), 0))
+        """How wrong the model is, and where; changes nothing. With another model, of touches: report.versus says which errs less.
+
+        Of several measurement files, sessions of one rig: the error in each (report.data), and report.sessions.
+        """
+        first, further = sessions(measurements, model, meshes, (), 0)
+        request = diagnosis_pb2.CompareRequest(evidence=first, further=further)
         if other_model is not None:
             request.other_model.CopyFrom(model_ref(other_model))
         return self._report("Compare", request, on_progress)
 
-    def diagnose(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
+    def diagnose(self, measurements: MeasurementsLike, model: ModelLike = None, *, meshes: MeshesLike = None,
                  also: Sequence[str | os.PathLike[str]] = (), seed: int = 0, with_surface_map: bool = False,
                  on_progress: OnProgress | None = None) -> Report:
         """Also why, what to add, and what the error becomes. The same arguments give the same report.
 
         Args:
+          measurements: also several files, sessions of one rig in the order in which they were made: report.sessions says
+            which values they share and which changed; the improved model is that of the last one.
           model: a name, a hash, a path to a model file, its text, or a Model; default: the server's.
           also: model files whose effects compete with the catalogue.
           seed: of permutations and draws.
           with_surface_map: put a map of the surfaces' departures into the improved model, where they are what is left.
           on_progress: is told the stage and the share that is done.
         """
-        request = diagnosis_pb2.DiagnoseRequest(
-            evidence=evidence(measurements, model, meshes, also, seed), with_surface_map=with_surface_map
-        )
+        first, further = sessions(measurements, model, meshes, also, seed)
+        request = diagnosis_pb2.DiagnoseRequest(evidence=first, further=further, with_surface_map=with_surface_map)
         return self._report("Diagnose", request, on_progress)
 
     def propose(self, measurements: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,

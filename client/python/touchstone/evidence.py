@@ -39,6 +39,29 @@ MeshLike = Union[Mesh, str, os.PathLike[str]]
 MeshesLike = Union[Mapping[str, MeshLike], str, os.PathLike[str], None]
 
 
+# One set, or several sessions of one rig in the order in which they were made.
+MeasurementsLike = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
+
+
+def sessions(measurements: MeasurementsLike, model: ModelLike, meshes: MeshesLike, also: Sequence[str | os.PathLike[str]],
+             seed: int) -> tuple[diagnosis_pb2.Evidence, list[diagnosis_pb2.Evidence]]:
+    """The message of the first session, with the meshes of all, and those of the others."""
+    if isinstance(measurements, (str, os.PathLike)):
+        return evidence(measurements, model, meshes, also, seed), []
+    if not measurements:
+        raise InvalidRequest("measurements is an empty list; give a measurement file, or several sessions.")
+    first, *others = (evidence(one, model, meshes, also, seed) for one in measurements)
+    known = {mesh.name for mesh in first.meshes}
+    for other in others:
+        for mesh in other.meshes:
+            if mesh.name not in known:
+                first.meshes.add().CopyFrom(mesh)
+                known.add(mesh.name)
+        for field in ("model", "meshes", "also_yaml", "seed"):
+            other.ClearField(field)
+    return first, others
+
+
 def evidence(measurements: str | os.PathLike[str], model: ModelLike, meshes: MeshesLike, also: Sequence[str | os.PathLike[str]],
              seed: int) -> diagnosis_pb2.Evidence:
     """The message; arguments as in Client.diagnose()."""

@@ -2,178 +2,29 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from google.protobuf import json_format
 
+from . import tabular
 from .errors import InvalidRequest
 from .measurements import Row
 from .plans import Touches
 from .printable import printable
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
+from .tabular import Rows, Tabular
 from .v1 import diagnosis_pb2
 from .whole_file import whole_file
 
 
-@dataclasses.dataclass(frozen=True)
-class Value:
-    """A parameter as it was fitted; the unit is in the name.
-
-    Attributes:
-      name: "radius_mm"; with its axis or finger ("offset_mm x") and object where it has them.
-      value, std_error: estimate and standard error.
-      interval: of 95 %.
-    """
-
-    name: str
-    value: float
-    std_error: float
-    interval: tuple[float, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class Quality:
-    """How wrong a model is on one kind of measurement, in the unit of its DataReport.
-
-    Attributes:
-      rmse: as compare() finds it.
-      heldout_rmse: on measurements that the fit did not see.
-      lack_of_fit_p: probability of at least this much misfit beyond noise if nothing were missing.
-    """
-
-    rmse: float
-    heldout_rmse: float
-    lack_of_fit_p: float
-
-
-@dataclasses.dataclass(frozen=True)
-class DataReport:
-    """What one kind of measurement says.
-
-    Attributes:
-      kind: "touches", "photographs", "boards" or "distributions" (touches without poses).
-      unit: of every error: "us", "grey" (levels of 255) or "px".
-      session: path or name of the measurements.
-      emulated: an emulator made them, or some: they measure nothing.
-      count: touches or pictures that took part.
-      noise_floor: what no model can go below; 0: unknown.
-      initial, final: of the given and of the improved model; None if nothing could be compared.
-      after_step: after each of Report.steps.
-      message: all of it, touchstone.v1.DataReport.
-    """
-
-    kind: str
-    unit: str
-    session: str
-    emulated: bool
-    count: int
-    noise_floor: float
-    initial: Quality | None
-    after_step: tuple[Quality, ...]
-    final: Quality | None
-    message: diagnosis_pb2.DataReport
-
-
-@dataclasses.dataclass(frozen=True)
-class Step:
-    """An effect to add. Its errors are those of DataReport.after_step, at its place in the list.
-
-    Attributes:
-      effect: its name.
-      equivalent: effects that these data cannot tell from it.
-      probability: of it, with its equivalents, among all that could take its place.
-      values: its parameters.
-      words: where it acts, if not everywhere, and what to doubt.
-      shown_by: of a joint diagnosis, the kinds of measurement that show it.
-    """
-
-    effect: str
-    equivalent: tuple[str, ...]
-    probability: float
-    values: tuple[Value, ...]
-    words: str
-    shown_by: tuple[str, ...]
-
-
-@dataclasses.dataclass(frozen=True)
-class Detectable:
-    """One value of an effect that the model lacks, and how well touches like these show it. Sizes are in the unit of the
-    name. pandas.DataFrame(report.detectable) is a table of them.
-
-    Attributes:
-      effect, name: "tip_radius", "radius_mm"; with its axis or finger ("offset_mm l").
-      stage: where in the simulation the effect acts.
-      std_error: what a fit leaves open; 0: these touches say nothing about the value.
-      typical, power_at_typical: what rigs usually show, and the chance that a diagnosis finds it, 0 to 1.
-      found_from: smallest size that is found in 80 % of such sets; None: none within the value's bounds.
-      rival, correlation: what resembles the effect most ("given:NAME": a value of the model's own), 0 to 1.
-      told_from: smallest size from which 80 % of such sets tell it from the rival; None: none does.
-      parted_by: what is known to tell the two apart.
-    """
-
-    effect: str
-    name: str
-    stage: str
-    std_error: float
-    typical: float
-    power_at_typical: float
-    found_from: float | None
-    rival: str
-    correlation: float
-    told_from: float | None
-    parted_by: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Explanation:
-    """Why one effect is, or is not, what a model lacks.
-
-    Attributes:
-      words: a sentence or two.
-      effect, values: its name, and its best values; the interval holds what the data do not exclude.
-      gain_nats, probability: of the effect as the only one that is missing.
-      rmse, heldout_rmse: with it, in the unit of the report's data.
-      taken_over: other effects, and the share of what it does that they do as well.
-      message: all of it, touchstone.v1.ExplainedEffect.
-    """
-
-    words: str
-    effect: str
-    values: tuple[Value, ...]
-    gain_nats: float
-    probability: float
-    rmse: float
-    heldout_rmse: float
-    taken_over: dict[str, float]
-    message: diagnosis_pb2.ExplainedEffect
-
-
-@dataclasses.dataclass(frozen=True)
-class Versus:
-    """A second model on the same touches.
-
-    Attributes:
-      words: which of the two errs less.
-      other: its error, as compare() finds it.
-      rmse_difference, interval: the other's RMSE less the given model's, and its 95 % interval over poses.
-      other_better: share of the bootstrap's draws in which the other errs less.
-      message: all of it, touchstone.v1.ModelComparison.
-    """
-
-    words: str
-    other: Quality
-    rmse_difference: float
-    interval: tuple[float, float]
-    other_better: float
-    message: diagnosis_pb2.ModelComparison
-
-
-class Report:
+class Report(Tabular):
     """How wrong a model is, and, of diagnose(), why and what to add. print(report) says it in a paragraph.
+
+    As a table and a figure: the error of each model on the way to the improved one, of check() what the plan can find.
 
     Attributes:
       message: all of it, touchstone.v1.Report; to_dict() has it in plain types, as `touchstone diagnose --json` writes it.
@@ -243,9 +94,9 @@ class Report:
         return data.noise_floor if data else math.nan
 
     @property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> Rows[Step]:
         """The effects to add, in this order."""
-        return tuple(
+        return Rows(
             Step(step.effect, tuple(step.equivalent), step.probability, tuple(map(_value, step.parameters)), step.words,
                  tuple(map(_kind, step.shown_by)))
             for step in self.message.steps
@@ -275,9 +126,9 @@ class Report:
         ]
 
     @property
-    def detectable(self) -> tuple[Detectable, ...]:
+    def detectable(self) -> Rows[Detectable]:
         """What touches like these can show, one entry per value of every effect that the model lacks."""
-        return tuple(map(_detectable, self.message.detectable))
+        return Rows(map(_detectable, self.message.detectable))
 
     @property
     def explained(self) -> Explanation | None:
@@ -296,6 +147,15 @@ class Report:
                 v = data.versus
                 return Versus(v.words, _quality(v.other), v.rmse_difference, (v.lower, v.upper), v.other_better, v)
         return None
+
+    @property
+    def sessions(self) -> Sessions | None:
+        """Of several sessions."""
+        if not self.message.HasField("sessions"):
+            return None
+        s = self.message.sessions
+        values = Rows(_compared(effect, value) for effect in s.effects for value in effect.values)
+        return Sessions(s.words, values, {place: text for place, text in enumerate(s.model_yaml) if text}, s)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types by the names of touchstone.v1.Report, those that are empty or 0 among them; without the table of touches,
@@ -319,6 +179,40 @@ class Report:
         if not self.improved_model:
             raise InvalidRequest("The report has no improved model: nothing is to be added or changed.")
         _write(path, self.improved_model)
+
+    def _ladder(self) -> list[tuple[DataReport, str, Quality]]:
+        """(data, model, its error) of the given model, after each step, of the improved one."""
+        found = []
+        for data in self.data:
+            models = [("given", data.initial), *zip((f"+ {step.effect}" for step in self.steps), data.after_step)]
+            if self.improved_model and data.final and (models[-1][1] is None or data.final.rmse != models[-1][1].rmse):
+                models.append(("improved", data.final))
+            found += [(data, name, quality) for name, quality in models if quality is not None]
+        return found
+
+    def _table(self) -> Mapping[str, Any]:
+        ladder = self._ladder()
+        if not ladder and self.message.detectable:
+            return self.detectable._table()
+        return {"data": [data.kind for data, _, _ in ladder], "session": [data.session for data, _, _ in ladder],
+                "unit": [data.unit for data, _, _ in ladder], "model": [name for _, name, _ in ladder],
+                "rmse": [quality.rmse for _, _, quality in ladder], "heldout_rmse": [quality.heldout_rmse for _, _, quality in ladder],
+                "noise_floor": [data.noise_floor for data, _, _ in ladder]}
+
+    def _heading(self) -> str:
+        return self.summary
+
+    def _draw(self, axes: Any) -> None:
+        ladder = self._ladder()
+        if not ladder:
+            self.detectable._draw(axes)
+            return
+        unit = ladder[0][0].unit  # of the first kind of measurement; others have another unit
+        shown = [each for each in ladder if each[0].unit == unit]
+        tabular.bars(axes, [name for _, name, _ in shown], [quality.rmse for _, _, quality in shown])
+        if shown[0][0].noise_floor:
+            axes.axvline(shown[0][0].noise_floor, color="0.5", linestyle=":", linewidth=1)
+        axes.set(xlabel=f"RMSE, {unit} (dotted: noise floor)")
 
     def __str__(self) -> str:
         return printable(self.summary)
@@ -349,6 +243,15 @@ def _detectable(d: diagnosis_pb2.DetectableEffect) -> Detectable:
         d.effect, " ".join(part for part in (d.parameter, d.finger) if part), d.stage, d.std_error, d.typical,
         d.power_at_typical, d.found_from if d.HasField("found_from") else None, d.rival, d.correlation,
         d.told_from if d.HasField("told_from") else None, d.parted_by,
+    )
+
+
+def _compared(effect: diagnosis_pb2.ComparedEffect, value: diagnosis_pb2.ComparedValue) -> ComparedValue:
+    return ComparedValue(
+        effect.effect, " ".join(part for part in (value.name, value.finger) if part), effect.object,
+        diagnosis_pb2.ComparedEffect.Change.Name(value.change).lower(), effect.p, value.difference,
+        (value.lower, value.upper), {one.session: (one.value, one.std_error) for one in value.sessions},
+        value.between_sessions, tuple(one.session for one in value.sessions if one.outside),
     )
 
 

@@ -75,7 +75,7 @@ class TouchstoneDataset(IterableDataset):
     DataLoader(dataset, batch_size=N) with the N given here as batch_size, or the order would depend on the number
     of workers. Only `loader()` can count what was delivered when there are workers.
 
-    Tensors: "descriptor_us" float32 (N, fingers), "object" int32 (N,), "index" int64 (N,), "image" uint8
+    Tensors: "descriptor_us" float32 (N, fingers), "object" int64 (N,), "index" int64 (N,), "image" uint8
     (N, channels, height, width), and so on; encoded images are a list of bytes.
     """
 

@@ -11,17 +11,18 @@ import { stale } from "./data/live";
 import { Photographs } from "./views/photographs";
 import { Power } from "./views/power";
 import { Data, Distributions, Methods, Next, Provenance } from "./views/rest";
+import { Sessions } from "./views/sessions";
 import { Problems, Todo } from "./views/todo";
 import { Detail, Where } from "./views/where";
 import { Unexplained, Why } from "./views/why";
 
-const links: [string, string][] = [["ladder", "Ladder"], ["check", "Check"], ["todo", "To do"], ["where", "Where"], ["touches", "Touches"], ["photographs", "Photographs"], ["why", "Why"], ["unexplained", "Unexplained"], ["power", "Power"], ["detail", "Groups"], ["histograms", "Histograms"], ["next", "Next"], ["baseline", "Baseline"], ["data", "Data"]];
+const links: [string, string][] = [["ladder", "Ladder"], ["check", "Check"], ["sessions", "Sessions"], ["todo", "To do"], ["where", "Where"], ["touches", "Touches"], ["photographs", "Photographs"], ["why", "Why"], ["unexplained", "Unexplained"], ["power", "Power"], ["detail", "Groups"], ["histograms", "Histograms"], ["next", "Next"], ["baseline", "Baseline"], ["data", "Data"]];
 
 function Navigation() {
   const { report } = page.value!;
   const any = (test: (data: (typeof report.data)[0]) => unknown) => report.data.some(test);
   const there: Record<string, unknown> = {
-    ladder: page.value!.words.ladder.length, check: report.data_problems.length, todo: report.steps.length || report.refitted.length || report.improved_model_yaml, where: any((d) => d.where.length || d.groups.length || d.curves.length),
+    ladder: page.value!.words.ladder.length, check: report.data_problems.length, sessions: report.sessions, todo: report.steps.length || report.refitted.length || report.improved_model_yaml, where: any((d) => d.where.length || d.groups.length || d.curves.length),
     touches: any((d) => d.touch_table), photographs: any((d) => d.photographs), why: any((d) => d.candidates.length), unexplained: any((d) => d.unexplained.words || d.unexplained.covariates.length || d.unexplained.formula || d.unexplained.curve),
     power: report.detectable.length, detail: any((d) => d.groups.length || d.curves.length), histograms: any((d) => d.histograms.length), next: report.next.length, baseline: true, data: report.data.length,
   };
@@ -52,7 +53,7 @@ export function App() {
     <>
       <Navigation />
       <main>
-        <Head /><Problems /><Ladder /><Todo /><Commands /><Distributions />
+        <Head /><Problems /><Sessions /><Ladder /><Todo /><Commands /><Distributions />
         {noName && <Unexplained />}
         <Where /><Explore /><Photographs /><Why />
         {!noName && <Unexplained />}

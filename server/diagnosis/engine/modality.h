@@ -9,6 +9,7 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/engine/stepwise_search.h"
 
@@ -47,6 +48,12 @@ class Modality {
   virtual const std::vector<Candidate>& candidates() const = 0;
   // What this kind alone is explained by: the given model's effects first, in their order.
   virtual const Fit& alone() const = 0;
+
+  // What that search says of an effect that it added; null: it added no such effect, or says nothing of single ones.
+  virtual const SelectedStep* FoundAlone(const std::string& /*effect*/) const { return nullptr; }
+
+  // Whether that search is surer of the effect, which alone() has, than of all that could take its place.
+  virtual bool ClaimsAlone(const std::string& /*effect*/) const { return true; }
 
   // The rows that values are taken from, near a fit. Default: those of the search.
   virtual absl::StatusOr<FinalRows> RowsNear(const Fit& /*fit*/) const {

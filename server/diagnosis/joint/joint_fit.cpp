@@ -23,12 +23,12 @@ struct State {
 
 class JointGaussNewton {
  public:
-  JointGaussNewton(const std::vector<Part>& parts, bool tied, JointFit* fit)
+  JointGaussNewton(const std::vector<Part>& parts, const HasOwnValue& has_own, JointFit* fit)
       : parts_(parts), kinds_(static_cast<int>(parts.size())), fit_(*fit), hypothesis_(parts.size(), 0) {
     fit_.fits.resize(kinds_), fit_.place.resize(kinds_), fit_.alone.resize(kinds_), states_.resize(kinds_);
     for (int kind = 0; kind < kinds_; ++kind) {
       for (int j = 0; j < parts[kind].start.size(); ++j) {
-        int place = tied ? PlaceOf(kind, j) : -1;
+        int place = has_own && has_own(parts[kind].start, j) ? -1 : PlaceOf(kind, j);
         if (place < 0) {
           place = static_cast<int>(fit_.parameters.size());
           fit_.parameters.push_back(parts[kind].start.parameters()[j]);
@@ -244,9 +244,9 @@ bool IsSameValue(const engine::Parameterization& a, int i, const engine::Paramet
          one.object == other.object && one.weights == other.weights;
 }
 
-absl::StatusOr<JointFit> FitJointly(const std::vector<Part>& parts, bool tied) {
+absl::StatusOr<JointFit> FitJointly(const std::vector<Part>& parts, const HasOwnValue& has_own) {
   JointFit fit;
-  TOUCHSTONE_RETURN_IF_ERROR(JointGaussNewton(parts, tied, &fit).Run());
+  TOUCHSTONE_RETURN_IF_ERROR(JointGaussNewton(parts, has_own, &fit).Run());
   return fit;
 }
 

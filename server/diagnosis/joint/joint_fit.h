@@ -42,7 +42,10 @@ struct JointFit {
 // Whether the two free parameters, of two kinds' models, are one value.
 bool IsSameValue(const engine::Parameterization& a, int i, const engine::Parameterization& b, int j);
 
-// `tied`: false gives each kind values of its own, for comparison. Errors: CANCELLED, or what a simulator says.
-absl::StatusOr<JointFit> FitJointly(const std::vector<Part>& parts, bool tied = true);
+// Whether a kind has its own value of a free parameter that other kinds have too.
+using HasOwnValue = std::function<bool(const engine::Parameterization& model, int parameter)>;
+
+// Errors: CANCELLED, or what a simulator says.
+absl::StatusOr<JointFit> FitJointly(const std::vector<Part>& parts, const HasOwnValue& has_own = nullptr);
 
 }  // namespace touchstone::diagnosis::joint

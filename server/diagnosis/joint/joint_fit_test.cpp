@@ -58,7 +58,8 @@ TEST(FitJointly, ValueIsTheMeanOfThreeKindsWeightedByTheirPrecisions) {
 
 TEST(FitJointly, UntiedKindsKeepTheirOwnValues) {
   const LinearKind one(0.002, 1), two(0.004, 11);
-  const auto fit = FitJointly({one.part(), two.part()}, false);
+  const auto fit =
+      FitJointly({one.part(), two.part()}, [](const engine::Parameterization&, int) { return true; });
   ASSERT_TRUE(fit.ok()) << fit.status();
   ASSERT_EQ(fit->point.size(), 2);
   EXPECT_NEAR(fit->point[0], one.Alone(), 0.02 * std::sqrt(fit->covariance(0, 0)));

@@ -90,7 +90,8 @@ class SharedFinder {
       for (const SharedEffect& effect : side.SharedOf(side.modality->alone()))
         if (!HasName(in_doubt, effect.name())) in_doubt.push_back(effect);
     }
-    TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit apart, FitJointly(parts, false));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit apart,
+                                FitJointly(parts, [](const engine::Parameterization&, int) { return true; }));
     const double ahead = apart.log_evidence - selection.best.fit.log_evidence;
     if (ahead < kConflictNats) return absl::OkStatus();
     for (const SharedEffect& effect : in_doubt) {

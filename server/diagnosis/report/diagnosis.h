@@ -15,9 +15,11 @@
 #include "server/diagnosis/engine/effect_explanation.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
+#include "server/diagnosis/joint/session_changes.h"
 #include "server/diagnosis/residuals/describe_residuals.h"
 #include "server/diagnosis/residuals/model_comparison.h"
 #include "server/diagnosis/touches/data_summary.h"
+#include "server/diagnosis/touches/same_poses.h"
 
 namespace touchstone::diagnosis::report {
 
@@ -158,6 +160,19 @@ struct DataReport {
   std::optional<boards::BoardLens> lens;
 };
 
+// Several sessions of touches with one model; sessions are places in Diagnosis::data.
+struct Sessions {
+  struct Pair {
+    int from = 0, to = 0;
+    touches::SamePoses measured, left;  // under the given model, and under each session's own
+  };
+  int count = 0;                                 // of all sessions
+  std::vector<int> taking_part;                  // sessions with enough touches; those of `changes`, in order
+  std::optional<joint::SessionChanges> changes;  // none: a comparison, or fewer than two take part
+  std::vector<Pair> same_poses;
+  std::string words;
+};
+
 using NextMeasurement = std::variant<design::ProposedTouch, images::ProposedPhotograph>;
 
 struct Diagnosis {
@@ -178,6 +193,7 @@ struct Diagnosis {
   // What touches like these could have shown.
   std::vector<engine::DetectableValue> detectable;
   std::optional<ReportedExplanation> explained;
+  std::optional<Sessions> sessions;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this

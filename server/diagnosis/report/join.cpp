@@ -19,14 +19,6 @@ namespace {
 
 using engine::Verdict;
 
-Verdict WorseOf(Verdict one, Verdict other) {
-  constexpr Verdict kWorseLater[] = {Verdict::kNone,           Verdict::kAdequate,    Verdict::kWrongValues,
-                                     Verdict::kMissingEffects, Verdict::kUnexplained, Verdict::kTooLittleData,
-                                     Verdict::kCheckData};
-  const auto rank = [&](Verdict v) { return std::find(std::begin(kWorseLater), std::end(kWorseLater), v); };
-  return rank(one) >= rank(other) ? one : other;
-}
-
 std::string NameOf(Verdict verdict) {
   return v1::Report::Verdict_Name(ToMessage(verdict));
 }
@@ -191,6 +183,14 @@ Verdict VerdictOf(const JointParts& parts) {
 }
 
 }  // namespace
+
+Verdict WorseOf(Verdict one, Verdict other) {
+  constexpr Verdict kWorseLater[] = {Verdict::kNone,           Verdict::kAdequate,    Verdict::kWrongValues,
+                                     Verdict::kMissingEffects, Verdict::kUnexplained, Verdict::kTooLittleData,
+                                     Verdict::kCheckData};
+  const auto rank = [&](Verdict v) { return std::find(std::begin(kWorseLater), std::end(kWorseLater), v); };
+  return rank(one) >= rank(other) ? one : other;
+}
 
 Diagnosis SideBySide(Diagnosis touches, Diagnosis photographs) {
   Diagnosis both = std::move(touches);

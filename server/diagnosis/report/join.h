@@ -8,6 +8,9 @@
 
 namespace touchstone::diagnosis::report {
 
+// The verdict of both parts of a diagnosis: that which leaves more to do.
+engine::Verdict WorseOf(engine::Verdict one, engine::Verdict other);
+
 // Both as they are, each with one entry of data: what either finds stands beside what the other does.
 Diagnosis SideBySide(Diagnosis touches, Diagnosis photographs);
 

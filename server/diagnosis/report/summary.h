@@ -24,6 +24,13 @@ std::vector<std::string> DataWarnings(const DataReport& data);
 // found elsewhere are in the model already.
 std::string Summarize(const Diagnosis& diagnosis, bool others_in_place = false);
 
+// Poses that two sessions touched differ beyond noise: P below which that is no chance.
+inline constexpr double kSamePosesP = 1e-4;
+// What changed between sessions, and whether the poses that they share agree: a few sentences.
+std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data);
+// What messages call the session: its file's name, or its path where two files have one name.
+std::string SessionName(const std::vector<DataReport>& data, int session);
+
 // "radius_mm 1.5 +- 0.005 mm".
 std::string ValueInWords(const engine::ParameterEstimate& value);
 

@@ -3,6 +3,7 @@
 #include "server/diagnosis/report/message_parts.h"
 #include "server/diagnosis/report/write_answers.h"
 #include "server/diagnosis/report/write_data_report.h"
+#include "server/diagnosis/report/write_sessions.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -109,6 +110,7 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
     WriteDetectable(value, report.add_detectable());
   if (diagnosis.explained)
     WriteExplanation(*diagnosis.explained, diagnosis.data[0].fingers, report.mutable_explained());
+  if (diagnosis.sessions) WriteSessions(*diagnosis.sessions, report.mutable_sessions());
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }

@@ -13,6 +13,13 @@ model::Model TouchPartOf(const model::Model& model) {
   return part;
 }
 
+std::vector<model::EffectInstance> PhotographEffectsOf(const model::Model& model) {
+  std::vector<model::EffectInstance> effects;
+  for (const model::EffectInstance& instance : model.effects)
+    if (instance.effect->of_photos()) effects.push_back(instance);
+  return effects;
+}
+
 absl::StatusOr<std::unique_ptr<TouchModality>> TouchModality::Make(const DiagnosisInput& input,
                                                                    const DiagnosisContext& context) {
   DiagnosisInput touches = input;
@@ -28,6 +35,17 @@ absl::StatusOr<std::unique_ptr<TouchModality>> TouchModality::Make(const Diagnos
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(made->found_, SelectExplanation(made->workspace_.get()));
   return made;
+}
+
+const engine::SelectedStep* TouchModality::FoundAlone(const std::string& effect) const {
+  for (const engine::SelectedStep& step : found_.steps)
+    if (engine::NameOf(*found_.fit.model.base().effects[step.effect].effect) == effect) return &step;
+  return nullptr;
+}
+
+bool TouchModality::ClaimsAlone(const std::string& effect) const {
+  const engine::SelectedStep* step = FoundAlone(effect);
+  return step != nullptr && step->probability > 0.5;
 }
 
 absl::StatusOr<engine::Quality> TouchModality::Compare(const model::Model& model) const {

@@ -13,6 +13,8 @@ namespace touchstone::diagnosis::selection {
 
 // The model as touches see it: without effects of photographs.
 model::Model TouchPartOf(const model::Model& model);
+// Its effects of photographs.
+std::vector<model::EffectInstance> PhotographEffectsOf(const model::Model& model);
 
 class TouchModality : public engine::Modality {
  public:
@@ -28,6 +30,10 @@ class TouchModality : public engine::Modality {
   const engine::Experiment& experiment() const override { return workspace_->experiment; }
   const std::vector<engine::Candidate>& candidates() const override { return found_.search->candidates(); }
   const engine::Fit& alone() const override { return found_.fit; }
+  const engine::SelectedStep* FoundAlone(const std::string& effect) const override;
+  bool ClaimsAlone(const std::string& effect) const override;
+  // Every touch, those that the search left out marked, as it was at the end of the search.
+  const Workspace& workspace() const { return *workspace_; }
   absl::StatusOr<engine::Quality> Compare(const model::Model& model) const override;
 
  private:

@@ -22,11 +22,12 @@ from .touch_data import TouchData, collect
 
 
 class Context:
-    """The sources are started when they are first asked for and end with close()."""
+    """The sources are started when they are first asked for and end with the `with` block."""
 
-    def __init__(self, settings: Settings):
+    def __init__(self, settings: Settings, simulator: touchstone.Client | None = None):
+        """`simulator`: the virtual source, which its owner closes; None: that of the settings."""
         self.settings = settings
-        self._simulator: touchstone.Client | None = None
+        self._simulator, self._owns_simulator = simulator, simulator is None
         self._rigs: dict[str, EmulatedRig] = {}
         self._name, self._begin = "", time.monotonic()
 
@@ -34,7 +35,7 @@ class Context:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        if self._simulator is not None:
+        if self._simulator is not None and self._owns_simulator:
             self._simulator.close()
         for rig in self._rigs.values():
             rig.stop()
@@ -62,11 +63,12 @@ class Context:
         self._rigs = {}
 
     def simulated(self, samples: int, *, plan: Any = None, objects: Sequence[str] = SUPERSHAPES, model: str | None = None,
-                  seed: int = 1, use: str = "training", image: Any = None) -> TouchData:
+                  seed: int = 1, use: str = "training", image: Any = None, **hand: float) -> TouchData:
         """`samples` touches of all objects together, in turn, by the simulator; `plan` None: of plans.simulated(). Touches of
-        another `use`, as "testing", are of other poses, whatever their seed."""
+        another `use`, as "testing", are of other poses, whatever their seed. `hand`: speed_mm_s and spacing_mm of collect()."""
         plan = plans.simulated(samples, len(objects)) if plan is None else plan
-        return collect(self.simulator, objects, plan, samples, model=model, seed=pose_seed(use, seed), image=image)
+        return collect(self.simulator, objects, plan, samples, model=model, seed=pose_seed(use, seed), image=image,
+                       **hand)
 
     def measured(self, plan: Any, *, objects: Sequence[str] = SUPERSHAPES, options: Sequence[str] = (), seed: int = 1,
                  image: Any = None) -> TouchData:

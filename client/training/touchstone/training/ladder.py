@@ -9,13 +9,18 @@ import dataclasses
 import hashlib
 import json
 import pathlib
+import re
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
 import touchstone
 
 from .context import Context
+from .features import Features, FeatureSets, curvatures, dealt_sets
 from .separation import check
+from .settings import SUPERSHAPES
 from .touch_data import TouchData
 
 # An emulated optical sensor's noise, so that what the model lacks is seen beside it (the seed's 48 ms would hide it).
@@ -109,52 +114,93 @@ def models(report: touchstone.Report) -> list[tuple[str, str]]:
     suggestion is that file itself, what `diagnose --save-model` writes; a suggestion what it writes --with-formula."""
     found = [("nominal", NOMINAL)]
     if report.improved_model:
-        head, blocks = _blocks(report.improved_model)
-        named = [step.effect for step in report.steps]
-        for count, name in enumerate(named, 1):
-            # Refitted values of effects that the nominal model has already are part of every rung but the first.
-            later = set(named[count:]) - set(named[:count])
-            model = head + "".join(block for block in blocks if _effect(block) not in later)
-            if model != found[-1][1]:
-                found.append((f"+ {name}", model))
-        if found[-1][1] != report.improved_model:
-            found.append(("+ refitted values", report.improved_model))
+        found = between(NOMINAL, report.improved_model, [step.effect for step in report.steps])
     if report.suggested_model:
         found.append(("+ suggestion", report.suggested_model))
     return found
 
 
+def between(nominal: str, better: str, added: Sequence[str] | None = None) -> list[tuple[str, str]]:
+    """(name, model file) of each rung from one model to another; both as a source writes them (touchstone.Model.yaml).
+
+    One effect after the other is added in the order of `added`, by default that of the better model's file; terms stand in the
+    order of that file, and the last rung is the file itself. What both models have, with other values, is part of every rung
+    but the first; where nothing else differs it is the only one. A single rung: the models have the same effects.
+    """
+    found = [("nominal", nominal)]
+    head, blocks = _blocks(better)
+    before = _blocks(nominal)[1]
+    named = list(dict.fromkeys(map(_title, blocks))) if added is None else list(added)
+    if added is None:
+        named = [name for name in named if name not in set(map(_title, before))]
+    for count, name in enumerate(named, 1):
+        # Refitted values of effects that the nominal model has already are part of every rung but the first.
+        later = set(named[count:]) - set(named[:count])
+        model = _joined(head, [block for block in blocks if _title(block) not in later])
+        if _effects(model) != _effects(found[-1][1]):
+            found.append((f"+ {name}", model))
+    if _effects(found[-1][1]) != _effects(better):
+        found.append(("+ refitted values", better))
+    return found
+
+
 def _blocks(model: str) -> tuple[str, list[str]]:
     """A model file up to its effects, and each effect with the lines that belong to it."""
-    head, _, effects = model.partition("effects:\n")
+    head, _, effects = model.partition("\neffects:")
     blocks: list[str] = []
     for line in effects.splitlines(keepends=True):
         if line.startswith("  - "):
             blocks.append(line)
-        elif line.strip():
+        elif blocks and line.strip():
             blocks[-1] += line
-    return head + "effects:\n", blocks
+    return head + "\n", blocks
 
 
-def _effect(block: str) -> str:
-    return block.strip().removeprefix("- ").partition(":")[0]
+def _joined(head: str, blocks: Sequence[str]) -> str:
+    return head + ("effects:\n" + "".join(blocks) if blocks else "effects: []\n")
+
+
+def _effects(model: str) -> tuple[str, list[str]]:
+    """What makes two models differ: the end effector, and the effects; not the name."""
+    head, blocks = _blocks(model)
+    return re.sub("^name:.*$", "", head, flags=re.MULTILINE), blocks
+
+
+def _title(block: str) -> str:
+    """The name of an effect; of a formula or a lookup the name that it was given."""
+    effect = block.strip().removeprefix("- ").partition(":")[0]
+    given = re.search(r"^      name: (.*)$", block, re.MULTILINE) if effect in ("formula", "lookup") else None
+    return given[1].strip('"') if given else effect
+
+
+def without(model: str, effects: Collection[str]) -> str:
+    """The model without these effects."""
+    head, blocks = _blocks(model)
+    return _joined(head, [block for block in blocks if _title(block) not in effects])
 
 
 def with_noise(model: str, sigma_us: float) -> str:
     """The model with this standard deviation of each finger's time, whatever it had; 0: none."""
-    head, blocks = _blocks(model)
+    head, blocks = _blocks(without(model, ["gaussian_noise"]))
     noise = [f"  - gaussian_noise: {{sigma_us: {sigma_us:.0f}}}\n"] if sigma_us else []
-    found = head + "".join(noise + [block for block in blocks if _effect(block) != "gaussian_noise"])
-    return found if noise or len(blocks) > 1 else found.rstrip("\n") + " []\n"
+    return _joined(head, noise + blocks)
 
 
-def commanded(data: TouchData, rows=slice(None)) -> touchstone.Touches:
+def simulated_sets(context: Context, model: str, seed: int, sets: int, touches: int, *, objects: Sequence[str] = SUPERSHAPES,
+                   features: Features = curvatures, **how: Any) -> FeatureSets:
+    """`sets` sets of `touches` touches of each object, by a model; what recognisers of a rung are trained on. `how`: of
+    Context.simulated()."""
+    data = context.simulated(sets * touches * len(objects), objects=objects, model=model, seed=seed, **how)
+    return dealt_sets(data, touches, np.random.default_rng(seed), features)
+
+
+def commanded(data: TouchData, rows=slice(None), standoff_mm: float = STANDOFF_MM) -> touchstone.Touches:
     """The touches that were commanded, to be simulated again."""
     unit = lambda vectors: vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     approach = unit(data.approach[rows])
     # They came as float32: lateral is made perpendicular to approach again, as the source wants it.
     lateral = data.lateral[rows] - np.sum(data.lateral[rows] * approach, 1, keepdims=True) * approach
-    return touchstone.touches(target_mm=data.target_mm[rows], approach=approach, lateral=unit(lateral), standoff_mm=STANDOFF_MM,
+    return touchstone.touches(target_mm=data.target_mm[rows], approach=approach, lateral=unit(lateral), standoff_mm=standoff_mm,
                               speed_mm_s=data.speed_mm_s)
 
 
@@ -166,13 +212,13 @@ def write_set(data: TouchData, path: pathlib.Path) -> None:
         touchstone.Row(k, data.objects[data.object[k]], touches[k:k + 1], tuple(data.times_us[k])) for k in range(len(data))])
 
 
-def simulate_again(context: Context, data: TouchData, model: str, seed: int) -> np.ndarray:
+def simulate_again(context: Context, data: TouchData, model: str, seed: int, *, standoff_mm: float = STANDOFF_MM) -> np.ndarray:
     """(N, fingers) contact times in microseconds, less the first finger's, of the same commanded touches by a model; NaN
     where a finger meets nothing."""
     times = np.empty_like(data.times_us)
     for k, name in enumerate(data.objects):
         rows = np.flatnonzero(data.object == k)
         if len(rows):
-            times[rows] = context.simulator.touch(name, commanded(data, rows), model=model, seed=seed,
+            times[rows] = context.simulator.touch(name, commanded(data, rows, standoff_mm), model=model, seed=seed,
                                                   start=k * 1_000_000)["descriptor_us"]
     return times

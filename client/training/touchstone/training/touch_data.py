@@ -83,11 +83,11 @@ _ARRAYS = ("object", "times_us", "target_mm", "approach", "lateral")
 
 
 def collect(client: touchstone.Client, objects: Sequence[str], plan: Any, samples: int, *, model: str | None = None,
-            seed: int = 1, image: Any = None, spacing_mm: float = 30.0) -> TouchData:
+            seed: int = 1, image: Any = None, spacing_mm: float = 30.0, speed_mm_s: float | None = None) -> TouchData:
     """`samples` samples of a dataset over `objects`, which take turns. Touches of which a finger's time is missing (a rig
     cannot draw again) are left out."""
     columns = ["object", "descriptor_us", "target_mm", "approach", "lateral", "speed_mm_s"]
-    dataset = client.dataset(objects, plan, samples=samples, seed=seed, model=model, image=image,
+    dataset = client.dataset(objects, plan, samples=samples, seed=seed, model=model, image=image, speed_mm_s=speed_mm_s,
                              columns=columns + (["image"] if image is not None else []))
     batches = list(dataset)
     joined = {name: np.concatenate([batch[name] for batch in batches]) for name in columns}

@@ -110,6 +110,24 @@ export interface Detectable {
   power_at_typical: number; found_from?: number; rival: string; correlation: number; told_from?: number; parted_by: string;
 }
 
+export interface SessionValue {
+  session: number; value: number; std_error: number; limit_lower: number; limit_upper: number; outside: boolean;
+}
+
+export interface ComparedValue {
+  name: string; unit: string; finger: string; change: string; sessions: SessionValue[]; from_session: number; to_session: number;
+  difference: number; std_error: number; lower: number; upper: number; between_sessions: number;
+}
+
+export interface ComparedEffect {
+  effect: string; object: string; change: string; p: number; gain_nats: number; equivalent: string[]; values: ComparedValue[];
+}
+
+export interface SessionComparison {
+  effects: ComparedEffect[]; model_yaml: string[]; words: string;
+  same_poses: { from_session: number; to_session: number; poses: number; rms_us: number; expected_us: number; p: number; rms_after_us: number; p_after: number }[];
+}
+
 export interface Report {
   verdict: string; summary: string; warnings: string[]; model_name: string; model_hash: string;
   data_problems: {
@@ -121,7 +139,7 @@ export interface Report {
     set_sha256: string; seed: string; command: string; date: string; client_version: string;
     meshes: { object: string; mesh_hash: string; path: string; file_sha256: string }[];
   };
-  p_nothing_missing?: number; hypotheses_tried: number; detectable: Detectable[];
+  p_nothing_missing?: number; hypotheses_tried: number; detectable: Detectable[]; sessions?: SessionComparison;
 }
 
 export interface Rung {

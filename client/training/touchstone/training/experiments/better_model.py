@@ -12,7 +12,7 @@ from sklearn import exceptions
 from .. import ladder, ladder_figures, ladder_words, plans
 from ..context import Context
 from ..experiment import Experiment
-from ..features import FeatureSets, dealt_rows, dealt_sets, of_rows
+from ..features import FeatureSets, dealt_rows, of_rows
 from ..ladder_words import Climb
 from ..prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
 from ..recognisers import SEEDS, TEN, Trained
@@ -48,9 +48,7 @@ def run(context: Context) -> Result:
 
 
 def _simulated(context: Context, model: str, seed: int, sets: int, use: str = "training") -> FeatureSets:
-    """Sets of simulated touches."""
-    data = context.simulated(sets * TOUCHES * len(plans.OBJECTS), model=model, seed=seed, use=use)
-    return dealt_sets(data, TOUCHES, np.random.default_rng(seed))
+    return ladder.simulated_sets(context, model, seed, sets, TOUCHES, use=use)
 
 
 def _seed(context, seed, rungs, rig, ranked):

@@ -1,0 +1,417 @@
+#include "server/diagnosis/session_reports.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+
+#include "server/base/status.h"
+#include "server/diagnosis/checks/data_problems.h"
+#include "server/diagnosis/early_verdicts.h"
+#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/report/join.h"
+#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/selection/touch_modality.h"
+#include "server/diagnosis/session_poses.h"
+#include "server/diagnosis/touch_reports.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis {
+namespace {
+
+using engine::Verdict;
+
+absl::Status CheckSessions(const std::vector<DiagnosisInput>& sessions) {
+  for (const DiagnosisInput& input : sessions) {
+    if (input.images != nullptr || input.set == nullptr)
+      return absl::InvalidArgumentError(
+          "several sessions are compared by their touches; give photographs alone, one set of them");
+    if (!input.set->has_poses)
+      return absl::InvalidArgumentError(
+          absl::StrCat(input.set->origin,
+                       ": has touches without poses, which several sessions cannot be compared by; "
+                       "compare it by itself"));
+    if (input.other_model != nullptr)
+      return absl::InvalidArgumentError("several sessions take one model; two were given");
+    if (input.set->fingers != sessions[0].set->fingers)
+      return absl::InvalidArgumentError(absl::StrCat(
+          input.set->origin, ": has times of ", input.set->fingers, " fingers, and ", sessions[0].set->origin,
+          " of ", sessions[0].set->fingers, "; sessions of one rig were expected"));
+  }
+  return absl::OkStatus();
+}
+
+class SessionsReporter {
+ public:
+  SessionsReporter(const std::vector<DiagnosisInput>& sessions, const DiagnosisContext& context)
+      : sessions_(sessions), context_(context) {
+    diagnosis_.model_name = given().name;
+    diagnosis_.model_hash = given().Hash();
+    diagnosis_.sessions.emplace();
+    diagnosis_.sessions->count = count();
+  }
+
+  absl::StatusOr<report::Diagnosis> Compare() {
+    for (int s = 0; s < count(); ++s) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          report::Diagnosis compared,
+          CompareTouches(sessions_[s], Stretch(0.9 * s / count(), 0.9 * (s + 1) / count())));
+      AddData(std::move(compared));
+    }
+    TOUCHSTONE_RETURN_IF_ERROR(CompareSamePoses());
+    Summarize();
+    return std::move(diagnosis_);
+  }
+
+  absl::StatusOr<report::Diagnosis> Diagnose() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool mistaken, FindMistakes());
+    if (mistaken) return std::move(diagnosis_);
+    TOUCHSTONE_RETURN_IF_ERROR(Search());
+    if (modalities_.size() < 2) return TooLittle();
+    TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis_.sessions->changes, FindChanges());
+    PutPhotographEffectsBack();
+    for (int s = 0; s < count(); ++s) TOUCHSTONE_RETURN_IF_ERROR(DiagnoseOne(s));
+    if (diagnosis_.verdict == Verdict::kCheckData) return MistakenAfterAll();
+    AddSteps();
+    TOUCHSTONE_RETURN_IF_ERROR(CompareSamePoses());
+    Judge();
+    Summarize();
+    return std::move(diagnosis_);
+  }
+
+ private:
+  int count() const { return static_cast<int>(sessions_.size()); }
+  const model::Model& given() const { return *sessions_[0].model; }
+  const joint::SessionChanges& changes() const { return *diagnosis_.sessions->changes; }
+  const std::vector<int>& taking_part() const { return diagnosis_.sessions->taking_part; }
+  std::string Name(int session) const { return report::SessionName(diagnosis_.data, session); }
+  // The place of a session among those that take part; -1: it does not.
+  int PlaceOf(int session) const {
+    const auto found = std::find(taking_part().begin(), taking_part().end(), session);
+    return found == taking_part().end() ? -1 : static_cast<int>(found - taking_part().begin());
+  }
+
+  DiagnosisContext Stretch(double from, double to) const {
+    DiagnosisContext part = context_;
+    if (context_.progress)
+      part.progress = [this, from, to](const std::string& stage, double done) {
+        return context_.progress(stage, from + (to - from) * done);
+      };
+    return part;
+  }
+
+  void AddData(report::Diagnosis one) {
+    diagnosis_.data.push_back(std::move(one.data[0]));
+    for (std::string& warning : one.warnings)
+      if (std::find(diagnosis_.warnings.begin(), diagnosis_.warnings.end(), warning) ==
+          diagnosis_.warnings.end())
+        diagnosis_.warnings.push_back(std::move(warning));
+    diagnosis_.duration_s += one.duration_s;
+  }
+
+  // A mistake of any file: no step is claimed beside it.
+  absl::StatusOr<bool> FindMistakes() {
+    std::vector<std::vector<engine::DataProblem>> problems;
+    bool any = false;
+    for (const DiagnosisInput& input : sessions_) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(problems.emplace_back(), checks::FindDataProblems(input, Stretch(0, 0.05)));
+      any |= !problems.back().empty();
+    }
+    if (!any) return false;
+    for (int s = 0; s < count(); ++s) {
+      const DiagnosisContext part = Stretch(0.1, 0.9);
+      absl::StatusOr<report::Diagnosis> one = problems[s].empty()
+                                                  ? CompareTouches(sessions_[s], part)
+                                                  : CheckDataReport(sessions_[s], part, problems[s]);
+      TOUCHSTONE_RETURN_IF_ERROR(one.status());
+      AddMistakes(*one, s);
+      AddData(*std::move(one));
+    }
+    SayMistakes();
+    return true;
+  }
+  void AddMistakes(const report::Diagnosis& one, int session) {
+    for (report::DataProblem problem : one.data_problems) {
+      problem.data_index = session;
+      diagnosis_.data_problems.push_back(std::move(problem));
+    }
+  }
+  void SayMistakes() {
+    diagnosis_.verdict = Verdict::kCheckData;
+    std::vector<std::string> sentences;
+    for (const report::DataProblem& problem : diagnosis_.data_problems)
+      sentences.push_back(absl::StrCat(Name(problem.data_index), ": ", problem.words));
+    sentences.push_back("Nothing is claimed of what changed between the sessions until that is mended.");
+    diagnosis_.summary = absl::StrJoin(sentences, " ");
+  }
+  // One that shows only once the effects of all sessions are in place.
+  report::Diagnosis MistakenAfterAll() {
+    diagnosis_.sessions->changes.reset();
+    for (report::DataReport& data : diagnosis_.data) data.final = data.initial;
+    SayMistakes();
+    return std::move(diagnosis_);
+  }
+
+  // What each session with enough touches is explained by alone.
+  absl::Status Search() {
+    for (int s = 0; s < count(); ++s) {
+      DiagnosisInput touches = sessions_[s];
+      touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
+      const double from = 0.05 + 0.35 * s / count();
+      TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace,
+                                  selection::MakeWorkspace(touches, Stretch(from, from)));
+      if (const int needed = TouchesNeeded(*workspace->observations); needed > 0) {
+        too_little_.insert(s);
+        continue;
+      }
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          modalities_.emplace_back(),
+          selection::TouchModality::Make(touches, Stretch(from, from + 0.35 / count())));
+      diagnosis_.sessions->taking_part.push_back(s);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<report::Diagnosis> TooLittle() {
+    std::vector<std::string> names;
+    for (int s = 0; s < count(); ++s) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one,
+                                  too_little_.count(s) > 0 ? DiagnoseTouches(sessions_[s], Stretch(0.5, 0.9))
+                                                           : CompareTouches(sessions_[s], Stretch(0.5, 0.9)));
+      AddData(std::move(one));
+    }
+    for (const int s : too_little_)
+      names.push_back(absl::StrCat(Name(s), " needs ", diagnosis_.data[s].needed, " touches"));
+    diagnosis_.verdict = Verdict::kTooLittleData;
+    diagnosis_.summary = absl::StrCat(
+        "Two sessions with enough touches are needed to say what changed: ", absl::StrJoin(names, ", "), ".");
+    return std::move(diagnosis_);
+  }
+
+  absl::StatusOr<joint::SessionChanges> FindChanges() const {
+    std::vector<const engine::Modality*> sessions;
+    for (const auto& modality : modalities_) sessions.push_back(modality.get());
+    const DiagnosisContext all = Stretch(0.4, 0.6);
+    return joint::FindSessionChanges(sessions, [&](double done) {
+      return !all.progress || all.progress("fitting all sessions together", done);
+    });
+  }
+
+  void PutPhotographEffectsBack() {
+    const std::vector<model::EffectInstance> effects = selection::PhotographEffectsOf(given());
+    joint::SessionChanges& found = *diagnosis_.sessions->changes;
+    const auto put_back = [&](std::vector<model::Model>* models) {
+      for (model::Model& model : *models)
+        model.effects.insert(model.effects.end(), effects.begin(), effects.end());
+    };
+    put_back(&found.models);
+    for (joint::SessionStep& step : found.steps) put_back(&step.models);
+  }
+
+  // A session under its own model: how wrong, where, and what is still missing.
+  absl::Status DiagnoseOne(int s) {
+    const double from = 0.6 + 0.35 * s / count(), to = 0.6 + 0.35 * (s + 1) / count();
+    const int place = PlaceOf(s);
+    TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis compared,
+                                CompareTouches(sessions_[s], Stretch(from, from)));
+    if (place < 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis little, DiagnoseTouches(sessions_[s], Stretch(from, to)));
+      AddData(std::move(little));
+      diagnosis_.warnings.push_back(absl::StrCat(Name(s),
+                                                 " takes no part in what is said of all sessions: it needs ",
+                                                 diagnosis_.data[s].needed, " touches"));
+      return absl::OkStatus();
+    }
+    DiagnosisInput input = sessions_[s];
+    const model::Model own = changes().models[place];
+    input.model = std::make_shared<const model::Model>(own);
+    input.initial_model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
+    for (const model::EffectInstance& instance : own.effects)
+      if (instance.effect->apply && !instance.effect->random())
+        input.settled.push_back(engine::NameOf(*instance.effect));
+    TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, DiagnoseTouches(input, Stretch(from, to)));
+    diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, VerdictOfRest(one));
+    AddRest(one, s, place);
+    AddMistakes(one, s);
+    report::DataReport& data = one.data[0];
+    const double ratio = changes().heldout[place].ratio;
+    data.final = data.initial;
+    if (data.final && changes().moved()) data.final->heldout_rmse = ratio * data.final->rmse;
+    data.initial = compared.data[0].initial;
+    data.after_step.clear();
+    if (changes().moved()) data.candidates.clear();  // beside the effects that are in place
+    for (const joint::SessionStep& step : changes().steps) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Quality quality,
+                                  modalities_[place]->Compare(step.models[place]));
+      data.after_step.push_back(report::InMicroseconds(quality));
+      data.after_step.back().heldout_rmse = ratio * data.after_step.back().rmse;
+    }
+    if (data.noise_floor && data.initial)
+      data.reducible_share = report::ReducibleShare(*data.noise_floor, data.initial->rmse);
+    AddData(std::move(one));
+    return absl::OkStatus();
+  }
+
+  static bool IsOfNoise(const model::Model& model, const std::string& effect) {
+    return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
+      return instance.effect->random() && engine::NameOf(*instance.effect) == effect;
+    });
+  }
+  // Whether all that a session asks for beside the effects of all sessions is another noise.
+  static bool AsksForNoiseAlone(const report::Diagnosis& one) {
+    if (!one.improved_model) return one.steps.empty() && one.refitted.empty();
+    const auto noise = [&](const auto& named) { return IsOfNoise(*one.improved_model, named.effect); };
+    return std::all_of(one.steps.begin(), one.steps.end(), noise) &&
+           std::all_of(one.refitted.begin(), one.refitted.end(), noise);
+  }
+  // Noise is a session's own. Another effect is no step: the sessions do not agree on it.
+  static Verdict VerdictOfRest(const report::Diagnosis& one) {
+    const bool still = one.verdict == Verdict::kMissingEffects || one.verdict == Verdict::kWrongValues;
+    return still && !AsksForNoiseAlone(one) ? Verdict::kUnexplained : one.verdict;
+  }
+  void AddRest(const report::Diagnosis& one, int session, int place) {
+    if (!AsksForNoiseAlone(one)) {
+      for (const report::Step& step : one.steps) still_.push_back({session, step.effect});
+      return;
+    }
+    if (!one.improved_model) return;
+    model::Model& own = diagnosis_.sessions->changes->models[place];
+    const std::string name = own.name;
+    own = *one.improved_model;
+    own.name = name;
+    noise_moved_ = true;
+    for (const report::Step& step : one.steps) {
+      const auto same = std::find_if(noise_steps_.begin(), noise_steps_.end(),
+                                     [&](const report::Step& other) { return other.effect == step.effect; });
+      if (same == noise_steps_.end())
+        noise_steps_.push_back(step);
+      else
+        *same = step;  // the last session's
+    }
+  }
+
+  void AddSteps() {
+    for (const joint::SessionStep& found : changes().steps) {
+      report::Step step;
+      step.effect = found.effect;
+      step.equivalent = found.equivalent;
+      step.probability = found.probability;
+      step.gain_nats = found.gain_nats;
+      step.parameters = found.parameters;
+      step.model = found.models.back();
+      for (const model::EffectInstance& instance : step.model.effects)
+        if (engine::NameOf(*instance.effect) == found.effect) {
+          step.scope = instance.per_object ? engine::EffectScope::kObject : engine::EffectScope::kRig;
+          engine::AddTexts(*instance.effect, &step);
+        }
+      for (const joint::ComparedEffect& compared : changes().effects)
+        if (compared.effect == found.effect && compared.values == joint::SessionValues::kOwn) {
+          engine::AddWords(absl::StrCat("Changed between the sessions: the values are those of ",
+                                        Name(taking_part().back()), "."),
+                           &step);
+          break;
+        }
+      if (!step.equivalent.empty()) {
+        std::vector<std::string> names = step.equivalent;
+        names.insert(names.begin(), step.effect);
+        step.discriminating_measurement = engine::DiscriminatingMeasurement(names);
+      }
+      engine::AddConfounded(step, &diagnosis_.confounded);
+      diagnosis_.steps.push_back(std::move(step));
+    }
+    for (report::Step& step : noise_steps_) {
+      step.model = changes().models.back();
+      diagnosis_.steps.push_back(std::move(step));
+      // Noise moves no error.
+      for (const int s : taking_part()) {
+        report::DataReport& data = diagnosis_.data[s];
+        if (data.final) data.after_step.push_back(*data.final);
+      }
+    }
+    diagnosis_.refitted = changes().refitted;
+    if (!changes().moved() && !noise_moved_) return;
+    diagnosis_.improved_model = changes().models.back();
+    diagnosis_.improved_model->name = given().name.empty() ? "" : given().name + "_better";
+  }
+
+  absl::Status CompareSamePoses() {
+    std::vector<SessionOnPoses> all;
+    for (int s = 0; s < count(); ++s) {
+      SessionOnPoses& one = all.emplace_back();
+      one.input = sessions_[s];
+      const auto part = [](const model::Model& model) {
+        return std::make_shared<const model::Model>(selection::TouchPartOf(model));
+      };
+      one.input.model = part(given());
+      const int place = diagnosis_.sessions->changes ? PlaceOf(s) : -1;
+      one.own = place >= 0 ? part(changes().models[place]) : one.input.model;
+      one.noise_floor = diagnosis_.data[s].noise_floor;
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis_.sessions->same_poses, CompareSharedPoses(all, Stretch(0.95, 1)));
+    return absl::OkStatus();
+  }
+
+  // What all sessions together say.
+  void Judge() {
+    if (!changes().steps.empty())
+      diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kMissingEffects);
+    else if (changes().moved())
+      diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kWrongValues);
+    for (const report::Sessions::Pair& pair : diagnosis_.sessions->same_poses)
+      if (pair.left.poses > 0 && pair.left.p < report::kSamePosesP)
+        diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kUnexplained);
+  }
+
+  void Summarize() {
+    report::Sessions& sessions = *diagnosis_.sessions;
+    sessions.words = report::SessionsInWords(sessions, diagnosis_.data);
+    std::vector<std::string> sentences;
+    for (int s = 0; s < count(); ++s) {
+      const report::DataReport& data = diagnosis_.data[s];
+      if (!data.initial) continue;
+      const bool better = data.final && data.final->rmse < data.initial->rmse;
+      sentences.push_back(absl::StrCat(
+          "In ", Name(s), " the model is off by ", report::ErrorInWords(data.kind, data.initial->rmse),
+          better ? absl::StrCat(", and by ", report::ErrorInWords(data.kind, data.final->rmse),
+                                " with what is found")
+                 : "",
+          "."));
+    }
+    for (const report::Step& step : diagnosis_.steps)
+      sentences.push_back(
+          absl::StrCat("Missing: ", step.effect, " (", report::ValuesInWords(step.parameters), ")."));
+    for (const auto& [session, effect] : still_)
+      sentences.push_back(absl::StrCat(Name(session), " alone asks for ", effect,
+                                       " beside it, which the other sessions do not show."));
+    if (!sessions.words.empty()) sentences.push_back(sessions.words);
+    diagnosis_.summary = absl::StrJoin(sentences, " ");
+  }
+
+  const std::vector<DiagnosisInput>& sessions_;
+  const DiagnosisContext& context_;
+  report::Diagnosis diagnosis_;
+  std::set<int> too_little_;
+  std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
+  bool noise_moved_ = false;               // a session has another noise than the given model
+  std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
+  std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all
+};
+
+}  // namespace
+
+absl::StatusOr<report::Diagnosis> CompareSessions(const std::vector<DiagnosisInput>& sessions,
+                                                  const DiagnosisContext& context) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSessions(sessions));
+  return SessionsReporter(sessions, context).Compare();
+}
+
+absl::StatusOr<report::Diagnosis> DiagnoseSessions(const std::vector<DiagnosisInput>& sessions,
+                                                   const DiagnosisContext& context) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckSessions(sessions));
+  return SessionsReporter(sessions, context).Diagnose();
+}
+
+}  // namespace touchstone::diagnosis
