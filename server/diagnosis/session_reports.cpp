@@ -8,7 +8,6 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/report/from_touches.h"
@@ -112,23 +111,25 @@ class SessionsReporter {
     diagnosis_.duration_s += one.duration_s;
   }
 
-  // A mistake of any file: no step is claimed beside it.
+  // What each session says by itself; a mistake of any file ends all: no step is claimed beside it.
   absl::StatusOr<bool> FindMistakes() {
-    std::vector<std::vector<engine::DataProblem>> problems;
     bool any = false;
-    for (const DiagnosisInput& input : sessions_) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(problems.emplace_back(), checks::FindDataProblems(input, Stretch(0, 0.05)));
-      any |= !problems.back().empty();
+    for (int s = 0; s < count(); ++s) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          report::Diagnosis one,
+          DiagnoseTouches(sessions_[s], Stretch(0.3 * s / count(), 0.3 * (s + 1) / count())));
+      any |= one.verdict == Verdict::kCheckData;
+      alone_.push_back(std::move(one));
     }
     if (!any) return false;
     for (int s = 0; s < count(); ++s) {
-      const DiagnosisContext part = Stretch(0.1, 0.9);
-      absl::StatusOr<report::Diagnosis> one = problems[s].empty()
-                                                  ? CompareTouches(sessions_[s], part)
-                                                  : CheckDataReport(sessions_[s], part, problems[s]);
-      TOUCHSTONE_RETURN_IF_ERROR(one.status());
-      AddMistakes(*one, s);
-      AddData(*std::move(one));
+      if (alone_[s].verdict == Verdict::kCheckData) {
+        AddMistakes(alone_[s], s);
+        AddData(std::move(alone_[s]));
+        continue;
+      }
+      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, CompareTouches(sessions_[s], Stretch(0.3, 0.9)));
+      AddData(std::move(one));
     }
     SayMistakes();
     return true;
@@ -158,33 +159,33 @@ class SessionsReporter {
   // What each session with enough touches is explained by alone.
   absl::Status Search() {
     for (int s = 0; s < count(); ++s) {
+      if (IsTooLittle(s)) continue;
       DiagnosisInput touches = sessions_[s];
       touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(given()));
-      const double from = 0.05 + 0.35 * s / count();
-      TOUCHSTONE_ASSIGN_OR_RETURN(const auto workspace,
-                                  selection::MakeWorkspace(touches, Stretch(from, from)));
-      if (const int needed = TouchesNeeded(*workspace->observations); needed > 0) {
-        too_little_.insert(s);
-        continue;
-      }
       TOUCHSTONE_ASSIGN_OR_RETURN(
           modalities_.emplace_back(),
-          selection::TouchModality::Make(touches, Stretch(from, from + 0.35 / count())));
+          selection::TouchModality::Make(touches,
+                                         Stretch(0.3 + 0.2 * s / count(), 0.3 + 0.2 * (s + 1) / count())));
       diagnosis_.sessions->taking_part.push_back(s);
+      std::set<std::string>& claimed = claimed_.emplace_back();
+      for (const report::Step& step : alone_[s].steps) claimed.insert(step.effect);
     }
     return absl::OkStatus();
   }
+  bool IsTooLittle(int session) const { return alone_[session].verdict == Verdict::kTooLittleData; }
 
   absl::StatusOr<report::Diagnosis> TooLittle() {
     std::vector<std::string> names;
     for (int s = 0; s < count(); ++s) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one,
-                                  too_little_.count(s) > 0 ? DiagnoseTouches(sessions_[s], Stretch(0.5, 0.9))
-                                                           : CompareTouches(sessions_[s], Stretch(0.5, 0.9)));
+      if (IsTooLittle(s)) {
+        AddData(std::move(alone_[s]));
+        names.push_back(absl::StrCat(report::SessionName(diagnosis_.data, s), " needs ",
+                                     diagnosis_.data[s].needed, " touches"));
+        continue;
+      }
+      TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, CompareTouches(sessions_[s], Stretch(0.5, 0.9)));
       AddData(std::move(one));
     }
-    for (const int s : too_little_)
-      names.push_back(absl::StrCat(Name(s), " needs ", diagnosis_.data[s].needed, " touches"));
     diagnosis_.verdict = Verdict::kTooLittleData;
     diagnosis_.summary = absl::StrCat(
         "Two sessions with enough touches are needed to say what changed: ", absl::StrJoin(names, ", "), ".");
@@ -194,8 +195,8 @@ class SessionsReporter {
   absl::StatusOr<joint::SessionChanges> FindChanges() const {
     std::vector<const engine::Modality*> sessions;
     for (const auto& modality : modalities_) sessions.push_back(modality.get());
-    const DiagnosisContext all = Stretch(0.4, 0.6);
-    return joint::FindSessionChanges(sessions, [&](double done) {
+    const DiagnosisContext all = Stretch(0.5, 0.6);
+    return joint::FindSessionChanges(sessions, claimed_, [&](double done) {
       return !all.progress || all.progress("fitting all sessions together", done);
     });
   }
@@ -256,9 +257,10 @@ class SessionsReporter {
   }
 
   static bool IsOfNoise(const model::Model& model, const std::string& effect) {
-    return std::any_of(model.effects.begin(), model.effects.end(), [&](const model::EffectInstance& instance) {
-      return instance.effect->random() && engine::NameOf(*instance.effect) == effect;
-    });
+    return std::any_of(model.effects.begin(), model.effects.end(),
+                       [&](const model::EffectInstance& instance) {
+                         return instance.effect->random() && engine::NameOf(*instance.effect) == effect;
+                       });
   }
   // Whether all that a session asks for beside the effects of all sessions is another noise.
   static bool AsksForNoiseAlone(const report::Diagnosis& one) {
@@ -393,10 +395,11 @@ class SessionsReporter {
   const std::vector<DiagnosisInput>& sessions_;
   const DiagnosisContext& context_;
   report::Diagnosis diagnosis_;
-  std::set<int> too_little_;
+  std::vector<report::Diagnosis> alone_;                               // of every session by itself
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
-  bool noise_moved_ = false;               // a session has another noise than the given model
-  std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
+  joint::ClaimedEffects claimed_;                                      // likewise
+  bool noise_moved_ = false;                        // a session has another noise than the given model
+  std::vector<report::Step> noise_steps_;           // kinds of noise that a session shows
   std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all
 };
 

@@ -52,9 +52,6 @@ class Modality {
   // What that search says of an effect that it added; null: it added no such effect, or says nothing of single ones.
   virtual const SelectedStep* FoundAlone(const std::string& /*effect*/) const { return nullptr; }
 
-  // Whether that search is surer of the effect, which alone() has, than of all that could take its place.
-  virtual bool ClaimsAlone(const std::string& /*effect*/) const { return true; }
-
   // The rows that values are taken from, near a fit. Default: those of the search.
   virtual absl::StatusOr<FinalRows> RowsNear(const Fit& /*fit*/) const {
     return FinalRows{experiment(), nullptr};

@@ -13,7 +13,7 @@ namespace touchstone::diagnosis::joint {
 namespace {
 
 // The effects that the sessions are compared in: the given model's, and those that any session names.
-std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
+std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides, const ClaimedEffects& claimed) {
   std::vector<SharedEffect> effects;
   const model::Model& given = sides[0].given();
   for (const model::EffectInstance& instance : given.effects)
@@ -27,7 +27,8 @@ std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
       const bool named = std::any_of(candidates.begin(), candidates.end(), [&](const engine::Candidate& c) {
         return !c.nameless && engine::NameOf(*c.effect) == found.name();
       });
-      if (found.given || !named || !side.modality->ClaimsAlone(found.name())) continue;
+      if (found.given || !named) continue;
+      if (!claimed.empty() && claimed[side.kind].count(found.name()) == 0) continue;
       const auto same = std::find_if(effects.begin(), effects.end(),
                                      [&](const SharedEffect& e) { return e.name() == found.name(); });
       if (same == effects.end()) {
@@ -47,13 +48,13 @@ std::vector<SharedEffect> EffectsOf(const std::vector<Side>& sides) {
 
 class ChangeFinder {
  public:
-  ChangeFinder(const std::vector<const engine::Modality*>& sessions,
+  ChangeFinder(const std::vector<const engine::Modality*>& sessions, const ClaimedEffects& claimed,
                const std::function<bool(double)>& progress)
       : progress_(progress) {
     for (size_t session = 0; session < sessions.size(); ++session)
       sides_.emplace_back(*sessions[session], static_cast<int>(session),
                           [](const model::Effect&) { return true; });
-    effects_ = EffectsOf(sides_);
+    effects_ = EffectsOf(sides_, claimed);
   }
 
   absl::StatusOr<SessionChanges> Run() {
@@ -272,8 +273,9 @@ bool SessionChanges::changed() const {
 }
 
 absl::StatusOr<SessionChanges> FindSessionChanges(const std::vector<const engine::Modality*>& sessions,
+                                                  const ClaimedEffects& claimed,
                                                   const std::function<bool(double done)>& progress) {
-  return ChangeFinder(sessions, progress).Run();
+  return ChangeFinder(sessions, claimed, progress).Run();
 }
 
 }  // namespace touchstone::diagnosis::joint

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,9 +35,14 @@ struct SessionChanges {
   bool changed() const;
 };
 
-// `sessions`: at least two of one kind, each with enough data for a verdict, that were searched with the same model.
-// `progress` is told how much is done, 0 to 1, and answers false to cancel. Errors: CANCELLED, or what a simulator says.
+// By session, the effects that its own diagnosis claims; empty: all that its search added.
+using ClaimedEffects = std::vector<std::set<std::string>>;
+
+// `sessions`: at least two of one kind, each with enough data for a verdict, that were searched with the same model. An effect
+// that no session claims is not compared. `progress` is told how much is done, 0 to 1, and answers false to cancel. Errors:
+// CANCELLED, or what a simulator says.
 absl::StatusOr<SessionChanges> FindSessionChanges(const std::vector<const engine::Modality*>& sessions,
+                                                  const ClaimedEffects& claimed,
                                                   const std::function<bool(double done)>& progress);
 
 }  // namespace touchstone::diagnosis::joint

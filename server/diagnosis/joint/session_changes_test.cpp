@@ -60,7 +60,7 @@ SessionChanges Find(const std::vector<Truth>& truths, uint64_t seed,
     sessions.push_back(Session(truths[s], 100 * seed + s, given));
     all.push_back(sessions.back().get());
   }
-  auto found = FindSessionChanges(all, nullptr);
+  auto found = FindSessionChanges(all, {}, nullptr);
   EXPECT_TRUE(found.ok()) << found.status();
   return *std::move(found);
 }

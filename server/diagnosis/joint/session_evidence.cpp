@@ -57,7 +57,8 @@ double VarianceFactor(const engine::ObservationModel& rows, const engine::Fit& f
   const Eigen::MatrixXd& columns = fit.columns.values;
   if (fit.hypothesis != 0 || !(fit.sigma > 0) || columns.cols() < 2) return 1;
   const std::vector<std::vector<int>> groupings = GroupingsOf(rows);
-  const double chance = kChance / (static_cast<double>(groupings.size()) * static_cast<double>(columns.cols() - 1));
+  const double chance =
+      kChance / (static_cast<double>(groupings.size()) * static_cast<double>(columns.cols() - 1));
   double factor = 1;
   for (const std::vector<int>& grouping : groupings)
     for (Eigen::Index j = 1; j < columns.cols(); ++j)

@@ -43,11 +43,6 @@ const engine::SelectedStep* TouchModality::FoundAlone(const std::string& effect)
   return nullptr;
 }
 
-bool TouchModality::ClaimsAlone(const std::string& effect) const {
-  const engine::SelectedStep* step = FoundAlone(effect);
-  return step != nullptr && step->probability > 0.5;
-}
-
 absl::StatusOr<engine::Quality> TouchModality::Compare(const model::Model& model) const {
   DiagnosisInput input = workspace_->input;
   input.model = std::make_shared<const model::Model>(TouchPartOf(model));

@@ -31,7 +31,6 @@ class TouchModality : public engine::Modality {
   const std::vector<engine::Candidate>& candidates() const override { return found_.search->candidates(); }
   const engine::Fit& alone() const override { return found_.fit; }
   const engine::SelectedStep* FoundAlone(const std::string& effect) const override;
-  bool ClaimsAlone(const std::string& effect) const override;
   // Every touch, those that the search left out marked, as it was at the end of the search.
   const Workspace& workspace() const { return *workspace_; }
   absl::StatusOr<engine::Quality> Compare(const model::Model& model) const override;
