@@ -168,8 +168,8 @@ std::string MissingEffects(const v1::Report& report) {
   if (!FallsAtAll(scale, from, to)) return absl::StrCat(lacks, "the error stays ", scale.Text(to), ".");
   const Floor floor = NoiseFloorOf(data);
   const bool reached = floor.sigma > 0 && to <= 1.05 * floor.sigma;
-  return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them " : "it ", Falls(scale, from, to),
-                      reached ? ", the noise floor" : "", InSession(report), ".");
+  return absl::StrCat(lacks, "with ", report.steps_size() > 1 ? "them" : "it", InSession(report), " ",
+                      Falls(scale, from, to), reached ? ", the noise floor." : ".");
 }
 
 }  // namespace

@@ -352,10 +352,15 @@ std::string SessionLabel(const v1::Report& report, int session) {
 
 std::string DataInWords(const v1::Report& report, const std::string& times) {
   std::string text;
-  if (report.has_sessions()) absl::StrAppend(&text, report.data_size(), " sessions: ");
+  if (report.has_sessions()) {
+    uint64_t touches = 0;
+    for (const v1::DataReport& data : report.data()) touches += data.count();
+    absl::StrAppend(&text, report.data_size(), " sessions, ", Count(touches), " touches");
+  }
   for (const v1::DataReport& data : report.data())
-    absl::StrAppend(&text, text.empty() || absl::EndsWith(text, ": ") ? "" : " and ", Count(data.count()),
-                    " ", ErrorScale(data).Counted(data.count()));
+    if (!report.has_sessions())
+      absl::StrAppend(&text, text.empty() ? "" : " and ", Count(data.count()), " ",
+                      ErrorScale(data).Counted(data.count()));
   if (report.data().empty()) return "0 touches";
   // Of a joint report the touches' set.
   const v1::DataSummary& set = report.data(0).set();

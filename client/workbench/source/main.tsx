@@ -2,7 +2,7 @@ import { render } from "preact";
 import { App, LiveApp } from "./app";
 import { startLive } from "./data/live";
 import { FileSource, isLive } from "./data/load";
-import { followHash, page, session, touchEntries } from "./state";
+import { followHash, page } from "./state";
 import "./style.css";
 
 const place = document.getElementById("page")!;
@@ -24,7 +24,6 @@ async function start(): Promise<void> {
   }
   const name = page.value.report.model_name;
   document.title = name ? `Touchstone report: ${name}` : "Touchstone report";
-  session.value = touchEntries.value[0]?.index ?? 0;
   followHash();
   place.replaceChildren();
   render(<App />, place);

@@ -10,7 +10,7 @@ export type Theme = "auto" | "light" | "dark";
 export const theme = signal<Theme>("auto");
 
 export const improved = signal(false); // residuals of the improved model instead of the given one
-export const session = signal(0); // entry of report.data with touches
+export const session = signal(-1); // entry of report.data with touches; -1: the one that the page is about
 export const slice = signal<number | null>(null);
 export const object = signal<string | null>(null);
 export const finger = signal<number | null>(null);
@@ -24,7 +24,7 @@ export const hasImproved = computed(() => !!page.value?.report.improved_model_ya
 // Entries of several sessions share the page; a click on a session shows its touches.
 export const touchEntries = computed(() =>
   (page.value?.report.data ?? []).map((data, index) => ({ data, index })).filter(({ data }) => data.touch_table));
-export const entry = computed(() => touchEntries.value.find(({ index }) => index === session.value) ?? touchEntries.value[0]);
+export const entry = computed(() => touchEntries.value.find(({ index }) => index === session.value) ?? touchEntries.value.find(({ index }) => index === page.value?.words.main) ?? touchEntries.value[0]);
 export const touches = computed(() => (entry.value ? new Touches(entry.value.data) : null));
 
 // Half the width of the colours' scale: of the given model, so that colours before and after mean the same.
@@ -118,7 +118,7 @@ const fields: Field[] = [
   optionalNumber("slice", slice), optionalText("object", object), optionalNumber("finger", finger), optionalNumber("touch", touch),
   optionalText("picture", picture), optionalNumber("step", step),
   { key: "model", read: () => (improved.value ? "improved" : ""), write: (text) => { improved.value = text === "improved"; } },
-  { key: "session", read: () => (session.value ? String(session.value) : ""), write: (text) => { session.value = Number(text) || 0; } },
+  { key: "session", read: () => (session.value >= 0 ? String(session.value) : ""), write: (text) => { session.value = text !== "" && Number.isInteger(Number(text)) ? Number(text) : -1; } },
   { key: "by", read: () => covariate.value, write: (text) => { covariate.value = text; } },
 ];
 

@@ -4,7 +4,7 @@ import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
 import { download } from "../charts/export";
-import { page, session, touchEntries } from "../state";
+import { page, session } from "../state";
 
 export interface Parameter { name: string; unit: string; lower: number; upper: number; typical: number; neutral: number; meaning: string; values: number[] }
 export interface ModelEffect { name: string; per_object: boolean; editable: boolean; parameters: Parameter[] }
@@ -101,7 +101,7 @@ async function show(report: Uint8Array, signal: AbortSignal): Promise<Report | n
     mine.signal.throwIfAborted();
     setError(data.words.main ?? 0);
     page.value = data;
-    session.value = touchEntries.value[0]?.index ?? 0;
+    session.value = -1;
     stale.value = false;
     return data.report;
   } catch (reason) {

@@ -28,7 +28,7 @@ export function Filters() {
         <button type="button" aria-pressed={!improved.value} onClick={() => { improved.value = false; }}>given model</button>
         <button type="button" aria-pressed={improved.value} onClick={() => { improved.value = true; }}>improved</button>
       </span>}
-      {touchEntries.value.length > 1 && <label>Session <select value={String(session.value)} onChange={(event) => { session.value = Number(event.currentTarget.value); clearFilters(); }}>
+      {touchEntries.value.length > 1 && <label>Session <select value={String(entry.value?.index ?? 0)} onChange={(event) => { session.value = Number(event.currentTarget.value); clearFilters(); }}>
         {touchEntries.value.map(({ data: one, index }) => <option value={String(index)}>{one.session || page.value!.words.of_data[index].kind_name}</option>)}</select></label>}
       <span class="segments" role="group" aria-label="Touch by touch, the worst first">
         <button type="button" onClick={() => walk(-1)} disabled={!shownTouches.value.length} aria-label="The touch before">‹</button>

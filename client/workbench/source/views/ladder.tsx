@@ -68,7 +68,7 @@ export function Ladder() {
     <Section id="ladder" title="Ladder" lead="The error of the model, change by change, down to the noise floor.">
       <Rungs />
       <p class="note">Bar: RMSE of the residuals on these data. Upright line: the same on data left out of the fit. Dashed: the noise floor. Lack of fit p: how likely that much misfit beyond noise is if nothing were missing. A click on a step shows what it is.</p>
-      {report.data.length > 1 && <AllKinds />}
+      {report.data.length > 1 && !report.sessions && <AllKinds />}
     </Section>
   );
 }

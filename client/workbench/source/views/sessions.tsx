@@ -2,7 +2,7 @@
 import { Key, Section, Table } from "../parts/parts";
 import { Tools } from "../parts/tools";
 import { count, error, number, probability, typeset, unitSymbol } from "../format";
-import { page, session } from "../state";
+import { entry, page, session } from "../state";
 import type { ComparedEffect, ComparedValue, DataReport, Report, SessionValue } from "../data/report";
 
 // A file's name; its path where two have one name (FileLabel of the server).
@@ -78,7 +78,7 @@ export function Sessions() {
   return (
     <Section id="sessions" title="Between the sessions" lead={typeset(compared.words)}>
       <Table title="Sessions" columns={["Session", { title: "touches", number: true }, { title: "given model", number: true }, { title: "its own", number: true }, { title: "noise floor", number: true }]}
-        rows={data.map((one, place) => [<button type="button" class="link" aria-pressed={session.value === place} onClick={() => { session.value = place; }}>{sessionLabel(data, place)}</button>, count(one.count),
+        rows={data.map((one, place) => [<button type="button" class="link" aria-pressed={entry.value?.index === place} onClick={() => { session.value = place; }}>{sessionLabel(data, place)}</button>, count(one.count),
           one.initial.rmse > 0 ? error(one.kind, one.initial.rmse) : "\u2013", one.final.rmse > 0 ? error(one.kind, one.final.rmse) : "\u2013", one.noise_floor > 0 ? error(one.kind, one.noise_floor) : "\u2013"])}
         csv={() => [["session", "touches", "rmse", "final_rmse", "noise_floor"], ...data.map((one) => [one.session, one.count, one.initial.rmse, one.final.rmse, one.noise_floor])]}
         caption="A click on a session shows its touches in the views below." />
