@@ -234,7 +234,9 @@ class SessionsReporter {
       if (instance.effect->apply && !instance.effect->random())
         input.settled.push_back(engine::NameOf(*instance.effect));
     TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, DiagnoseTouches(input, Stretch(from, to)));
-    diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, VerdictOfRest(one));
+    const Verdict rest = VerdictOfRest(one);
+    if (rest == Verdict::kUnexplained) unexplained_.push_back(s);
+    diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, rest);
     AddRest(one, s, place);
     AddMistakes(one, s);
     report::DataReport& data = one.data[0];
@@ -388,6 +390,12 @@ class SessionsReporter {
     for (const auto& [session, effect] : still_)
       sentences.push_back(absl::StrCat(Name(session), " alone asks for ", effect,
                                        " beside it, which the other sessions do not show."));
+    if (!unexplained_.empty() && sessions.changes && sessions.changes->changed()) {
+      std::vector<std::string> names;
+      for (const int s : unexplained_) names.push_back(Name(s));
+      absl::StrAppend(&sessions.words, " In ", absl::StrJoin(names, " and "),
+                      " a rest remains that no effect explains: what changed may stand in for it.");
+    }
     if (!sessions.words.empty()) sentences.push_back(sessions.words);
     diagnosis_.summary = absl::StrJoin(sentences, " ");
   }
@@ -398,6 +406,7 @@ class SessionsReporter {
   std::vector<report::Diagnosis> alone_;                               // of every session by itself
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
   joint::ClaimedEffects claimed_;                                      // likewise
+  std::vector<int> unexplained_;           // sessions with a rest under their own models
   bool noise_moved_ = false;                        // a session has another noise than the given model
   std::vector<report::Step> noise_steps_;           // kinds of noise that a session shows
   std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all

@@ -11,6 +11,7 @@ const axe = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.m
 const touches = sample("touches");
 const photographs = sample("photographs");
 const plan = sample("plan");
+const sessions = sample("sessions");
 let browser;
 
 before(async () => {
@@ -183,6 +184,22 @@ test("the page of a plan says what it finds, with a bar for every value and no e
     assert.match(await page.locator("#data").innerText(), /5\.00\sms, as it was given/);
     assert.deepEqual(await violations(page), []);
   }, { name: "plan" });
+});
+
+test("the page of several sessions names what changed, and charts every value with its limits", async () => {
+  await opened(sessions, async (page) => {
+    assert.match(await page.locator("h1").innerText(), /lacks tip_radius; with it in 2026-11-05\.csv the error falls/);
+    const part = page.locator("#sessions");
+    assert.match(await part.innerText(), /Changed: tip_radius radius_mm from .* in 2026-11-01\.csv to .* in 2026-11-04\.csv/);
+    assert.equal(await part.locator(".control svg").count(), 1);
+    assert.equal(await part.locator(".control svg g").count(), 5);
+    assert.match(await part.locator(".control figcaption").innerText(), /Outside: 2026-11-04\.csv/);
+    // A session that is chosen is the one whose touches are shown, and the address holds it.
+    await part.getByRole("button", { name: "2026-11-04.csv" }).click();
+    assert.match(page.url(), /session=3/);
+    assert.equal(await part.getByRole("button", { name: "2026-11-04.csv" }).getAttribute("aria-pressed"), "true");
+    assert.deepEqual(await violations(page), []);
+  }, { name: "sessions" });
 });
 
 test("axe finds nothing, in light and in dark", async () => {
