@@ -85,17 +85,16 @@ void AddHelp(Cli* cli) {
   cli->AddCommand(nullptr, "version", "Prints the version.", "touchstone version",
                   [cli] { return cli->Print(absl::StrCat("touchstone ", kVersion, "\n")); });
   auto shell = std::make_shared<std::string>();
-  CLI::App* completion =
-      cli->AddCommand(nullptr, "completion", "Prints what makes a shell complete commands and options.",
-                      "source <(touchstone completion bash)                    in ~/.bashrc\n"
-                      "source <(touchstone completion zsh)                     in ~/.zshrc\n"
-                      "touchstone completion fish | source                     in ~/.config/fish/config.fish",
-                      [cli, shell]() -> absl::Status {
-                        if (const auto known = OneOf("SHELL", *shell, {"bash", "zsh", "fish"}); !known.ok())
-                          return known.status();
-                        return cli->Print(*shell == "fish" ? FishCompletion(*cli)
-                                                           : CompletionScript(*cli, *shell == "zsh"));
-                      });
+  CLI::App* completion = cli->AddCommand(
+      nullptr, "completion", "Prints what makes a shell complete commands and options.",
+      "source <(touchstone completion bash)                    in ~/.bashrc\n"
+      "source <(touchstone completion zsh)                     in ~/.zshrc\n"
+      "touchstone completion fish | source                     in ~/.config/fish/config.fish",
+      [cli, shell]() -> absl::Status {
+        if (const auto known = OneOf("SHELL", *shell, {"bash", "zsh", "fish"}); !known.ok())
+          return known.status();
+        return cli->Print(*shell == "fish" ? FishCompletion(*cli) : CompletionScript(*cli, *shell == "zsh"));
+      });
   completion->add_option("SHELL", *shell, "bash, zsh or fish")->required();
   // What the build makes manual pages of (cmake/documents.cmake); no user needs it.
   auto page = std::make_shared<std::vector<std::string>>();

@@ -48,7 +48,8 @@ def made(tmp_path_factory):
             touchstone("rig", "run", folder / "plan.csv", "-o", folder / "run.db", "--session", "kestrel", server=address)
             touchstone("session", "export", "kestrel", "-o", folder / "original.csv", server=address)
             status = touchstone("rig", "status", server=address)
-            touchstone("rig", "bundle", "kestrel", "--config", config, "--seed", "7", "-o", folder / "bug.tar.gz", server=address)
+            said = touchstone("rig", "bundle", "kestrel", "--config", config, "--seed", "7", "-o", folder / "bug.tar.gz", server=address)
+            assert "session.db, audit.jsonl, gateway.toml, state.json" in said
     finally:
         emulator.terminate()
         emulator.wait(timeout=PATIENCE_S)

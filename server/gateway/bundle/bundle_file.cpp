@@ -180,8 +180,9 @@ bool IsBundleName(const std::string& name) {
   return before != '/';
 }
 
-absl::Status WriteBundle(const std::string& path, nlohmann::ordered_json manifest,
-                         const std::vector<BundleMember>& members) {
+absl::StatusOr<nlohmann::ordered_json> WriteBundle(const std::string& path,
+                                                   const nlohmann::ordered_json& manifest,
+                                                   const std::vector<BundleMember>& members) {
   nlohmann::ordered_json head = {{"format", kFormat}, {"format_version", kFormatVersion}};
   head.update(manifest);
   head["files"] = nlohmann::ordered_json::array();
@@ -223,7 +224,8 @@ absl::Status WriteBundle(const std::string& path, nlohmann::ordered_json manifes
   }();
   TOUCHSTONE_RETURN_IF_ERROR(sink.status);  // says more than libarchive's text
   TOUCHSTONE_RETURN_IF_ERROR(packed);
-  return sink.file->Close();
+  TOUCHSTONE_RETURN_IF_ERROR(sink.file->Close());
+  return head;
 }
 
 OpenedBundle::~OpenedBundle() {

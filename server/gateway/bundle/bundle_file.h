@@ -28,10 +28,11 @@ struct BundleMember {
   std::string path;
 };
 
-// Makes the file at `path`, which must be free. `manifest` gets "files": name, bytes and SHA-256 of each. Owner and times of
+// Makes the file at `path`, which must be free, and returns its manifest: `manifest` and "files", name, bytes and SHA-256 of each. Owner and times of
 // the files are not in it. RESOURCE_EXHAUSTED beyond kMaxBundleBytes.
-absl::Status WriteBundle(const std::string& path, nlohmann::ordered_json manifest,
-                         const std::vector<BundleMember>& members);
+absl::StatusOr<nlohmann::ordered_json> WriteBundle(const std::string& path,
+                                                   const nlohmann::ordered_json& manifest,
+                                                   const std::vector<BundleMember>& members);
 
 // A bundle whose every byte was checked, unpacked in a folder that only this user may enter, and which goes with the object.
 class OpenedBundle {

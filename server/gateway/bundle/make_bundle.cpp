@@ -188,8 +188,7 @@ absl::StatusOr<Json> MakeBundle(const BundleRequest& request, const std::string&
   manifest["replaced"] = aliases.Counts();
   manifest["kept"] = {"names of objects and of covariates", "measurements, times and settings",
                       "serial ports", "what pictures show and mesh files hold"};
-  TOUCHSTONE_RETURN_IF_ERROR(WriteBundle(path, manifest, parts.members()));
-  return manifest;
+  return WriteBundle(path, manifest, parts.members());
 }
 
 }  // namespace touchstone::gateway::bundle
