@@ -1,7 +1,9 @@
-# What `cmake --install` puts where, and the package that find_package(touchstone) finds. Two components:
-#   runtime      programs, meshes, the protocol, documents, systemd units
+# What `cmake --install` puts where, and the package that find_package(touchstone) finds. Components:
+#   runtime      the command line, the probe, the emulated rig, meshes, the protocol, documents, manual pages, completion
+#   server       touchstone-server and its systemd unit
+#   gateway      touchstone-gateway and its systemd unit
 #   development  static libraries, their headers, the package for CMake
-# deploy/check-install tries both.
+# deploy/check-install tries all. cmake/packages.cmake makes a package of each.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -19,7 +21,11 @@ endfunction()
 
 function(touchstone_install_runtime)
   set(share ${CMAKE_INSTALL_DATADIR}/touchstone)
-  install(TARGETS ${touchstone_programs} RUNTIME COMPONENT runtime)
+  foreach(program ${touchstone_programs})
+    touchstone_component(component ${program})
+    install(TARGETS ${program} RUNTIME COMPONENT ${component})
+  endforeach()
+  touchstone_documents()
   install(DIRECTORY meshes DESTINATION ${share} COMPONENT runtime)
   install(DIRECTORY proto/touchstone DESTINATION ${share}/proto COMPONENT runtime FILES_MATCHING PATTERN "*.proto")
   # At the time of installing: documents under the paths that their links name, without the folders that hold none; and
@@ -39,15 +45,43 @@ function(touchstone_install_runtime)
       cmake_path(GET document PARENT_PATH folder)
       file(INSTALL "${source}/${document}" DESTINATION "${CMAKE_INSTALL_PREFIX}/@CMAKE_INSTALL_DOCDIR@/${folder}")
     endforeach()
-    get_filename_component(prefix "${CMAKE_INSTALL_PREFIX}" ABSOLUTE)
-    foreach(unit touchstone-server.service touchstone-gateway.service)
-      file(READ "${source}/deploy/systemd/${unit}" text)
+  ]=] code @ONLY)
+  install(CODE "${code}" COMPONENT runtime)
+  foreach(component server gateway)
+    string(CONFIGURE [=[
+      set(unit touchstone-@component@.service)
+      get_filename_component(prefix "${CMAKE_INSTALL_PREFIX}" ABSOLUTE)
+      file(READ "@CMAKE_CURRENT_SOURCE_DIR@/deploy/systemd/${unit}" text)
       string(REPLACE "/usr/local/bin/" "${prefix}/@CMAKE_INSTALL_BINDIR@/" text "${text}")
       file(WRITE "@CMAKE_CURRENT_BINARY_DIR@/units/${unit}" "${text}")
       file(INSTALL "@CMAKE_CURRENT_BINARY_DIR@/units/${unit}" DESTINATION "${CMAKE_INSTALL_PREFIX}/lib/systemd/system")
-    endforeach()
-  ]=] code @ONLY)
-  install(CODE "${code}" COMPONENT runtime)
+    ]=] code @ONLY)
+    install(CODE "${code}" COMPONENT ${component})
+  endforeach()
+endfunction()
+
+# touchstone_component(RESULT PROGRAM)
+function(touchstone_component result program)
+  set(component runtime)
+  if(program MATCHES "^touchstone-(server|gateway)$")
+    set(component ${CMAKE_MATCH_1})
+  endif()
+  set(${result} ${component} PARENT_SCOPE)
+endfunction()
+
+# Manual pages and completion are asked of the programs, once they are built.
+function(touchstone_documents)
+  set(into ${CMAKE_CURRENT_BINARY_DIR}/documents)
+  add_custom_command(OUTPUT ${into}.made
+    COMMAND ${CMAKE_COMMAND} -D BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} -D INTO=${into} -P ${CMAKE_CURRENT_SOURCE_DIR}/cmake/documents.cmake
+    COMMAND ${CMAKE_COMMAND} -E touch ${into}.made
+    DEPENDS ${touchstone_programs} cmake/documents.cmake COMMENT "Manual pages and completion")
+  add_custom_target(touchstone_documents ALL DEPENDS ${into}.made)
+  install(DIRECTORY ${into}/share/ DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT runtime OPTIONAL
+    PATTERN "touchstone-server.1.gz" EXCLUDE PATTERN "touchstone-gateway.1.gz" EXCLUDE)
+  foreach(component server gateway)
+    install(FILES ${into}/share/man/man1/touchstone-${component}.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${component} OPTIONAL)
+  endforeach()
 endfunction()
 
 # touchstone_folder(RESULT TARGET): the folder of its CMakeLists.txt, from the root of the repository.

@@ -23,7 +23,7 @@ class HelpCommandTest : public RealBinaryTest {
   std::set<std::string> Offered(const std::string& typed, const std::string& begun) {
     Write("script", Run({"completion", "bash"}).out);
     Write("ask", "source ./script\nCOMP_WORDS=(touchstone " + typed + " '" + begun +
-                     "')\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n_touchstone\nprintf '%s\\n' "
+                     "')\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n_touchstone_complete\nprintf '%s\\n' "
                      "\"${COMPREPLY[@]}\" > offered\n");
     EXPECT_EQ(std::system(("cd '" + Path("") + "' && bash ask").c_str()), 0);
     const std::vector<std::string> lines = absl::StrSplit(Read("offered"), '\n', absl::SkipEmpty());
@@ -81,6 +81,31 @@ TEST_F(HelpCommandTest, BashCompletesCommandsAndOptions) {
   EXPECT_EQ(Offered("diagnose set.csv", "--save-m"), (std::set<std::string>{"--save-model"}));
   EXPECT_TRUE(Offered("diagnose", "set").empty()) << "files are the shell's";
   EXPECT_EQ(Run({"completion", "tcsh"}).exit_code, 2);
+}
+
+TEST_F(HelpCommandTest, FishIsToldWhatEachCommandAndOptionIsFor) {
+  const std::string script = Run({"completion", "fish"}).out;
+  EXPECT_THAT(script,
+              HasSubstr("\ncomplete -c touchstone -f -n '__touchstone_at --exactly' -a diagnose -d '"));
+  EXPECT_THAT(script,
+              HasSubstr("\ncomplete -c touchstone -f -n '__touchstone_at --exactly rig' -a run -d '"));
+  EXPECT_THAT(script, HasSubstr("\ncomplete -c touchstone -n '__touchstone_at rig run' -l session -r -d '"));
+  EXPECT_THAT(script,
+              HasSubstr("\ncomplete -c touchstone -n '__touchstone_at rig run' -l help -s h -d 'This text'"));
+}
+
+TEST_F(HelpCommandTest, AManualPageSaysWhatHelpSays) {
+  const std::string list = Run({"man", "--list"}).out;
+  EXPECT_THAT(list, testing::StartsWith("touchstone\n"));
+  EXPECT_THAT(list, HasSubstr("\ntouchstone rig run\n"));
+  EXPECT_EQ(list.find("touchstone man"), std::string::npos) << "what help does not list";
+  const std::string page = Run({"man", "rig", "bundle"}).out;
+  EXPECT_THAT(page, testing::StartsWith(".TH TOUCHSTONE\\-RIG\\-BUNDLE 1 "));
+  EXPECT_THAT(page, HasSubstr("\n.SH ARGUMENTS\n.TP\n.B SESSION\n"));
+  EXPECT_THAT(page, HasSubstr("\n.B \\-o, \\-\\-output FILE\nThe bundle (.tar.gz) (required)\n"));
+  EXPECT_THAT(page, HasSubstr("\n.SH EXAMPLES\n.nf\ntouchstone rig bundle monday"));
+  EXPECT_THAT(page, HasSubstr(".SH SEE ALSO\n.BR touchstone (1),\n.BR touchstone\\-rig (1)\n"));
+  EXPECT_EQ(Run({"man", "diagnos"}).exit_code, 2);
 }
 
 TEST_F(HelpCommandTest, TextIsAsWideAsTheTerminal) {

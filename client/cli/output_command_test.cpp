@@ -111,6 +111,7 @@ std::vector<OutputCase> Cases() {
        {"session.db"},
        true,
        false},
+      {"RigBundle", {"rig", "bundle", "--journal", "session.db", "-o", "OUT"}, ".tar.gz", {"session.db"}},
       {"RigDryRun",
        {"rig", "dry-run", "plan.csv", "-o", "OUT", "--server", kNowhere, "--wait-s", "0"},
        ".svg",

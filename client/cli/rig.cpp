@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <google/protobuf/util/json_util.h>
+
 #include "server/base/status.h"
 
 namespace touchstone::cli {
@@ -30,6 +32,21 @@ absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
 
 absl::StatusOr<v1::RigState> GetRig(client::Connection* connection) {
   return connection->Call(&v1::Rig::Stub::GetRig, v1::GetRigRequest());
+}
+
+absl::StatusOr<Json> RigJson(const v1::State& state, const v1::RigState& rig) {
+  google::protobuf::util::JsonPrintOptions print;
+  print.always_print_primitive_fields = true;
+  print.preserve_proto_field_names = true;
+  Json json;
+  for (const auto& [name, message] :
+       {std::pair<const char*, const google::protobuf::Message*>{"state", &state}, {"rig", &rig}}) {
+    std::string text;
+    if (!google::protobuf::util::MessageToJsonString(*message, &text, print).ok())
+      return absl::InternalError("the rig's state cannot be written as JSON");
+    json[name] = Json::parse(text);
+  }
+  return json;
 }
 
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
@@ -105,6 +122,7 @@ void AddRig(Cli* cli) {
   AddRigPhotos(cli, group);
   AddRigCalibrate(cli, group);
   AddRigTeach(cli, group);
+  AddRigBundle(cli, group);
 }
 
 }  // namespace touchstone::cli

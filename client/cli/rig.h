@@ -20,6 +20,8 @@ struct RigConnection {
 absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli);
 
 absl::StatusOr<v1::RigState> GetRig(client::Connection* connection);
+// {"state": State, "rig": RigState}: as JSON with the protocol's names and units.
+absl::StatusOr<Json> RigJson(const v1::State& state, const v1::RigState& rig);
 
 // Says that the object lies on the fixture as it must. Where the rig changes it by itself it does; else a
 // person is asked, unless it lies there already.
@@ -42,5 +44,6 @@ void AddRigRun(Cli* cli, CLI::App* group);
 void AddRigPhotos(Cli* cli, CLI::App* group);
 void AddRigCalibrate(Cli* cli, CLI::App* group);
 void AddRigTeach(Cli* cli, CLI::App* group);
+void AddRigBundle(Cli* cli, CLI::App* group);
 
 }  // namespace touchstone::cli

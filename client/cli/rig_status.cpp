@@ -3,8 +3,6 @@
 #include <cmath>
 #include <thread>
 
-#include <google/protobuf/util/json_util.h>
-
 #include "client/cli/rig.h"
 #include "client/cli/terminal.h"
 #include "client/source/lab_units.h"
@@ -136,17 +134,7 @@ absl::Status PrintState(const Cli& cli, client::Connection* connection) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::State state,
                               connection->Call(&v1::Control::Stub::GetState, v1::GetStateRequest()));
   if (!cli.output().json) return cli.Print(StateText(rig, state));
-  google::protobuf::util::JsonPrintOptions print;
-  print.always_print_primitive_fields = true;
-  print.preserve_proto_field_names = true;
-  Json json;
-  for (const auto& [name, message] :
-       {std::pair<const char*, const google::protobuf::Message*>{"state", &state}, {"rig", &rig}}) {
-    std::string text;
-    if (!google::protobuf::util::MessageToJsonString(*message, &text, print).ok())
-      return absl::InternalError("the rig's state cannot be written as JSON");
-    json[name] = Json::parse(text);
-  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(Json json, RigJson(state, rig));
   // The words that people read elsewhere, instead of the enums' names.
   json["state"]["state"] = client::SourceStateWord(state.state());
   json["rig"]["up_face"] = client::UpFaceWord(rig.up_face());

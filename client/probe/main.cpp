@@ -13,6 +13,7 @@
 #include "server/base/out_of_memory.h"
 #include "server/base/text.h"
 #include "server/service/channel.h"
+#include "server/service/man_page.h"
 
 namespace {
 
@@ -78,6 +79,7 @@ int main(int argc, char** argv) {
       ->needs(ca);
   app.add_option("--timeout-s", options.timeout_s, "Seconds to wait. Default: 3")
       ->check(CLI::Range(0.1, 60.0));
+  if (touchstone::service::PrintedManPage(app, argc, argv)) return 0;
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

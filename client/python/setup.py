@@ -1,8 +1,8 @@
 """Builds wheel and sdist with the stubs of proto/touchstone/v1, generated here. See pyproject.toml.
 
-TOUCHSTONE_PROGRAMS names the folder that `cmake --install --component runtime` filled: then its programs, meshes and
-protocol become a part of the wheel, with a command for each program (deploy/package calls it so). Without it the wheel is
-the client alone, for every machine.
+TOUCHSTONE_PROGRAMS names the folder that `cmake --install` filled with the components runtime, server and gateway: then its
+programs, meshes and protocol become a part of the wheel, with a command for each program (deploy/package calls it so). Without
+it the wheel is the client alone, for every machine.
 """
 
 import importlib.machinery

@@ -35,7 +35,8 @@ std::vector<Option> OptionsOf(GatewayFlags* flags, RawGatewayFlags* raw) {
   GatewayOptions& o = flags->options;
   std::vector<Option> options = {
       {"listen", "Address to listen on, HOST:PORT; port 0: any free one", &o.common.listen},
-      {"replay", "Serve this journal instead of a rig", &o.replay},
+      {"replay", "Serve this journal, or the bug report of touchstone rig bundle, instead of a rig",
+       &o.replay},
       {"journal", "The SQLite file that keeps every touch", &o.journal},
       {"audit_log", "JSON lines of what was done with the rig, and by whom; empty: none", &o.audit_log},
       {"calibration", "Where tool, objects and camera stand (YAML)", &o.calibration},
@@ -236,6 +237,7 @@ absl::StatusOr<GatewayFlags> ParseGatewayFlags(int argc, const char* const* argv
           "  touchstone-gateway --config rig.toml\n"
           "  touchstone-gateway --arm-address 192.168.0.10 --arm-model ur3e --effector-port /dev/ttyACM0\n"
           "  touchstone-gateway --replay session.db\n"
+          "  touchstone-gateway --replay bug.tar.gz\n"
           "\nThe physical source: drives a UR3 arm, the end effector and a camera behind the same services "
           "as\n"
           "touchstone-server. It prints 'listening on HOST:PORT' when it is ready. Its stop is a software "

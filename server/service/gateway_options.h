@@ -24,7 +24,7 @@ struct ArmOptions {
 
 struct GatewayOptions {
   ServerOptions common;  // listen, meshes, limits, lease window, drain
-  std::string replay;    // a journal to serve instead of a rig
+  std::string replay;    // a journal, or a bundle (gateway/bundle/), to serve instead of a rig
   std::string journal = "rig.db";
   std::string audit_log = "rig.audit.jsonl";
   std::string calibration = "calibration.yaml";

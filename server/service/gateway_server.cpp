@@ -3,14 +3,18 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/ur_arm.h"
+#include "server/gateway/bundle/replay.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/timing/host_time.h"
 #include "server/service/freedrive_service.h"
 #include "server/service/journal_sessions_service.h"
+#include "server/service/replay_service.h"
 #include "server/service/request_guard.h"
 #include "server/service/rig_service.h"
 #include "server/service/serving.h"
@@ -104,12 +108,15 @@ absl::StatusOr<std::unique_ptr<gateway::Rig>> OpenRig(const GatewayOptions& opti
 
 struct GatewayServer::Parts {
   Resources resources;
+  gateway::bundle::Replay replay;     // its files go last; empty: a rig, or a journal, is served
   std::unique_ptr<LeaseBook> leases;  // before the rig, whose audit log asks who holds one
   std::unique_ptr<source::PhysicalSource> source;
-  gateway::Rig* rig = nullptr;  // the source's device, if it is one
+  gateway::Rig* rig = nullptr;              // the source's device, if it is one
+  source::RecordedRig* replayed = nullptr;  // likewise, of a bug report
   std::unique_ptr<SourceService> source_service;
   std::unique_ptr<ControlService> control;
   std::unique_ptr<RigService> rig_service;
+  std::unique_ptr<ReplayRigService> replay_service;
   std::unique_ptr<FreedriveService> freedrive;
   std::unique_ptr<JournalSessionsService> sessions;
   Serving serving;
@@ -134,6 +141,14 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
   resources.OpenPlaces();
   resources.access->CountRefusals(resources.calls.get());
   resources.pool = std::make_unique<ThreadPool>(0);
+  if (gateway::bundle::LooksLikeBundle(options.replay)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts.replay, gateway::bundle::OpenReplay(options.replay));
+    // A mesh that was named here takes the place of the bundle's.
+    std::vector<source::MeshSpec>& meshes = options.common.meshes;
+    for (const source::MeshSpec& mesh : parts.replay.meshes)
+      if (std::none_of(meshes.begin(), meshes.end(), [&](const auto& own) { return own.name == mesh.name; }))
+        meshes.push_back(mesh);
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(
       resources.objects, source::ObjectStore::Load(options.common.meshes, options.common.supershape_triangles,
                                                    resources.pool.get()));
@@ -147,7 +162,10 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     device = std::move(rig);
   } else {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<source::RecordedRig> recorded,
-                                source::RecordedRig::Open(options.replay));
+                                parts.replay.bundle == nullptr
+                                    ? source::RecordedRig::Open(options.replay)
+                                    : source::RecordedRig::Open(parts.replay.journal, parts.replay.faults));
+    if (parts.replay.bundle != nullptr) parts.replayed = recorded.get();
     journal = &recorded->journal();
     device = std::move(recorded);
   }
@@ -168,6 +186,11 @@ absl::StatusOr<std::unique_ptr<GatewayServer>> GatewayServer::Start(GatewayOptio
     services.push_back({"touchstone.v1.Rig", parts.rig_service.get()});
     parts.freedrive = std::make_unique<FreedriveService>(&resources, parts.leases.get(), parts.rig);
     services.push_back({"touchstone.v1.Freedrive", parts.freedrive.get()});
+  } else if (parts.replayed != nullptr) {
+    parts.control = std::make_unique<ReplayControlService>(&resources, parts.leases.get(), parts.replay);
+    parts.replay_service =
+        std::make_unique<ReplayRigService>(&resources, parts.leases.get(), parts.replay, parts.replayed);
+    services.push_back({"touchstone.v1.Rig", parts.replay_service.get()});
   } else {
     parts.control = std::make_unique<ControlService>(&resources, parts.leases.get());
   }

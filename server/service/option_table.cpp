@@ -27,6 +27,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
+#include "server/service/man_page.h"
 
 namespace touchstone::service {
 namespace {
@@ -183,6 +184,8 @@ absl::StatusOr<CommandLine> ReadCommandLine(const std::string& program, const st
   app.add_option("--config", line.config, config_help);
   app.add_flag("--version", version, "Print the version");
   AddFlags(options, &app);
+  line.done = PrintedManPage(app, argc, argv);
+  if (line.done) return line;
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

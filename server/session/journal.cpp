@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+
 #include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -50,7 +52,12 @@ absl::Status JournalFile::AddSession(const SessionContent& content) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t session_id, InsertSession(file_.get(), session));
     const Known known{session_id, session.fingers, session.spacing_m};
     SessionTally tally;
-    TOUCHSTONE_RETURN_IF_ERROR(AppendFinished(session.name, known, content.touches, content.series, &tally));
+    // A touch that was tried again left a gap.
+    const std::vector<JournalTouch>& touches = content.touches;
+    const bool rising = std::adjacent_find(touches.begin(), touches.end(), [](const auto& a, const auto& b) {
+                          return a.number >= b.number;
+                        }) == touches.end();
+    TOUCHSTONE_RETURN_IF_ERROR(AppendFinished(session.name, known, touches, content.series, rising, &tally));
     for (const JournalImage& image : content.images)
       TOUCHSTONE_RETURN_IF_ERROR(AppendImage(session.name, known, image, &tally));
     return WriteTally(file_.get(), session_id, tally);

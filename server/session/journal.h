@@ -176,7 +176,8 @@ class Journal {
                               const std::string& error) = 0;
 
   // A session that was made elsewhere with all that it has, in one step, or nothing of it. Touches and pictures as
-  // AddFinished and AddImage take them. ALREADY_EXISTS if there is one of its name.
+  // AddFinished and AddImage take them; touches keep numbers that rise from one to the next. ALREADY_EXISTS if there is
+  // one of its name.
   virtual absl::Status AddSession(const SessionContent& content) = 0;
   // Touches that were made elsewhere, kDone or kFailed, in the order of their approaches: all in one step, or
   // none. Their numbers are given anew, after those that are there. ALREADY_EXISTS names an id that is.

@@ -109,7 +109,8 @@ class JournalFile : public Journal {
   // Within a transaction.
   absl::Status AppendFinished(const std::string& session, const Known& known,
                               const std::vector<JournalTouch>& touches,
-                              const std::vector<std::optional<JournalSeries>>& series, SessionTally* tally);
+                              const std::vector<std::optional<JournalSeries>>& series, bool keep_numbers,
+                              SessionTally* tally);
   absl::Status AppendImage(const std::string& session, const Known& known, const JournalImage& given,
                            SessionTally* tally);
   // journal_trash.cpp; within a transaction.

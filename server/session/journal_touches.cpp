@@ -138,7 +138,8 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
   TOUCHSTONE_ASSIGN_OR_RETURN(const Known known, WantSession(session));
   return Write([&]() -> absl::Status {
     TOUCHSTONE_ASSIGN_OR_RETURN(SessionTally tally, ReadTally(file_.get(), known.session_id));
-    TOUCHSTONE_RETURN_IF_ERROR(AppendFinished(session, known, touches, series, &tally));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        AppendFinished(session, known, touches, series, /*keep_numbers=*/false, &tally));
     return WriteTally(file_.get(), known.session_id, tally);
   });
 }
@@ -146,7 +147,7 @@ absl::Status JournalFile::AddFinished(const std::string& session, const std::vec
 absl::Status JournalFile::AppendFinished(const std::string& session, const Known& known,
                                          const std::vector<JournalTouch>& touches,
                                          const std::vector<std::optional<JournalSeries>>& series,
-                                         SessionTally* tally) {
+                                         bool keep_numbers, SessionTally* tally) {
   TOUCHSTONE_ASSIGN_OR_RETURN(uint64_t number, NextNumber(known.session_id));
   for (size_t k = 0; k < touches.size(); ++k) {
     JournalTouch touch = touches[k];
@@ -160,7 +161,7 @@ absl::Status JournalFile::AppendFinished(const std::string& session, const Known
     if (there != 0)
       return absl::AlreadyExistsError(absl::StrCat(Called(), "session '", session, "' has a touch '",
                                                    touch.id, "' already; add to a session of another name"));
-    touch.number = number++;
+    if (!keep_numbers) touch.number = number++;
     TOUCHSTONE_RETURN_IF_ERROR(InsertTouch(file_.get(), known.session_id, touch,
                                            k < series.size() && series[k] ? &*series[k] : nullptr, tally));
   }

@@ -33,7 +33,7 @@ std::string CellKey(const std::string& object, int64_t x, int64_t y, int64_t z) 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RecordedTouches>> RecordedTouches::Read(
-    const Journal& journal, const std::vector<std::string>& sessions) {
+    const Journal& journal, const std::vector<std::string>& sessions, bool failed_too) {
   std::unique_ptr<RecordedTouches> recorded(new RecordedTouches);
   std::vector<JournalSession> chosen;
   if (sessions.empty()) {
@@ -54,11 +54,12 @@ absl::StatusOr<std::unique_ptr<RecordedTouches>> RecordedTouches::Read(
           recorded->fingers_, " fingers ", FileNumber(Unit::kMillimetre, recorded->spacing_m_),
           " mm apart; sessions of one end effector can be served together"));
     TOUCHSTONE_RETURN_IF_ERROR(journal.ForEachTouch(session.name, [&](const JournalTouch& touch) {
-      if (touch.stage == TouchStage::kDone) recorded->Add(touch);
+      if (touch.stage == TouchStage::kDone || (failed_too && touch.stage == TouchStage::kFailed))
+        recorded->Add(touch);
       return true;
     }));
   }
-  if (recorded->touches_.empty())
+  if (recorded->touches_.empty() && !failed_too)
     return absl::InvalidArgumentError(
         "nothing was recorded: no session has a touch that is done; name a journal with measurements");
   return recorded;

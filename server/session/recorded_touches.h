@@ -19,9 +19,10 @@ namespace touchstone::session {
 class RecordedTouches {
  public:
   // Of these sessions; all of the journal if none is named. INVALID_ARGUMENT if their fingers or spacings
-  // differ, or if nothing was recorded.
+  // differ, or if nothing was recorded. With `failed_too` also what failed, and it is no error if there is nothing.
   static absl::StatusOr<std::unique_ptr<RecordedTouches>> Read(const Journal& journal,
-                                                               const std::vector<std::string>& sessions = {});
+                                                               const std::vector<std::string>& sessions = {},
+                                                               bool failed_too = false);
 
   // In order of appearance.
   const std::vector<std::string>& objects() const { return objects_; }

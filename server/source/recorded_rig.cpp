@@ -16,10 +16,26 @@ constexpr double kVerticalFovRad =
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Open(const std::string& path) {
+  return Read(path, /*failed_too=*/false);
+}
+
+absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Open(const std::string& path,
+                                                               RecordedFaults faults) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::unique_ptr<RecordedRig> rig, Read(path, /*failed_too=*/true));
+  rig->faults_ = std::move(faults);
+  // Without a log of what failed, the journal has the last error of each touch.
+  for (const session::JournalTouch& touch : rig->touches_->touches())
+    if (touch.stage == session::TouchStage::kFailed && rig->faults_[touch.id].empty())
+      rig->faults_[touch.id].push_back(absl::UnknownError(touch.error));
+  return rig;
+}
+
+absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Read(const std::string& path, bool failed_too) {
   std::unique_ptr<RecordedRig> source(new RecordedRig);
   TOUCHSTONE_ASSIGN_OR_RETURN(source->journal_,
                               session::Journal::Open(path, session::Journal::Mode::kReadOnly));
-  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_, session::RecordedTouches::Read(*source->journal_));
+  TOUCHSTONE_ASSIGN_OR_RETURN(source->touches_,
+                              session::RecordedTouches::Read(*source->journal_, {}, failed_too));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions,
                               source->journal_->Sessions());
   for (const session::JournalSession& session : sessions)
@@ -32,16 +48,33 @@ absl::StatusOr<std::unique_ptr<RecordedRig>> RecordedRig::Open(const std::string
   return source;
 }
 
-absl::StatusOr<session::JournalTouch> RecordedRig::Touch(const TouchCommand& command,
-                                                         const MotionGuard& guard) {
-  TOUCHSTONE_RETURN_IF_ERROR(guard());
+const session::JournalTouch* RecordedRig::FindTouch(const TouchCommand& command) const {
   const session::JournalTouch* touch = touches_->FindId(command.id);
   if (touch == nullptr || touch->object != command.object ||
       !session::SameCommand(touch->command, command.bytes))
     touch = touches_->Find(command.object, command.bytes, command.repeat);
+  return touch;
+}
+
+absl::Status RecordedRig::NextFault(const std::string& id, bool stays) {
+  const auto faults = faults_.find(id);
+  if (faults == faults_.end() || faults->second.empty()) return absl::OkStatus();
+  const std::lock_guard<std::mutex> lock(asked_mutex_);
+  size_t& asked = asked_[id];
+  if (asked < faults->second.size()) return faults->second[asked++];
+  return stays ? faults->second.back() : absl::OkStatus();
+}
+
+absl::StatusOr<session::JournalTouch> RecordedRig::Touch(const TouchCommand& command,
+                                                         const MotionGuard& guard) {
+  TOUCHSTONE_RETURN_IF_ERROR(guard());
+  const session::JournalTouch* const touch = FindTouch(command);
+  // What was refused before it began stands in no journal.
+  if (touch == nullptr) TOUCHSTONE_RETURN_IF_ERROR(NextFault(command.id, /*stays=*/true));
   if (touch == nullptr)
     return absl::NotFoundError(
         absl::StrCat("this is a recorded session, and no such touch of '", command.object, "' was recorded"));
+  TOUCHSTONE_RETURN_IF_ERROR(NextFault(touch->id, touch->stage != session::TouchStage::kDone));
   return *touch;
 }
 
@@ -91,7 +124,8 @@ image::Intrinsics RecordedRig::IntrinsicsOf(const image::Frame& frame) const {
 
 SourceStatus RecordedRig::Status() const {
   SourceStatus status;
-  status.touches = touches_->touches().size();
+  for (const session::JournalTouch& touch : touches_->touches())
+    status.touches += touch.stage == session::TouchStage::kDone;
   status.images = images_.size();
   return status;
 }

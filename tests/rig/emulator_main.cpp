@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/base/stop_signals.h"
+#include "server/service/man_page.h"
 #include "tests/rig/emulator.h"
 #include "tests/rig/emulator_commands.h"
 #include "tests/rig/emulator_files.h"
@@ -68,9 +69,11 @@ int main(int argc, char** argv) {
 
   CLI::App app(
       std::string("touchstone-rig-emulator, ") + touchstone::rig::kNotice +
-      ".\nAn emulated UR controller, the firmware's core behind a pseudo-terminal, and a camera, for tests "
-      "of "
-      "touchstone-gateway.\nPrints \"ready DIR/gateway.toml\" when everything listens; ends on SIGTERM.");
+          ".\nAn emulated UR controller, the firmware's core behind a pseudo-terminal, and a camera, for "
+          "tests "
+          "of "
+          "touchstone-gateway.\nPrints \"ready DIR/gateway.toml\" when everything listens; ends on SIGTERM.",
+      "touchstone-rig-emulator");
   app.option_defaults()->always_capture_default();
   app.add_option("--dir", options.dir,
                  "Folder for gateway.toml, calibration.yaml, emulator.json, the log and the port");
@@ -121,6 +124,7 @@ int main(int argc, char** argv) {
       "tell", std::string("Tells a running emulator something: ") + touchstone::rig::kCommands);
   tell->add_option("where", where, "HOST:PORT of its control port (emulator.json)")->required();
   tell->add_option("words", words, "What to tell")->required();
+  if (touchstone::service::PrintedManPage(app, argc, argv)) return 0;
   // Faces begin with a sign: these words are not searched for options.
   const bool telling = argc >= 4 && std::string(argv[1]) == "tell";
   if (telling) where = argv[2], words.assign(argv + 3, argv + argc);

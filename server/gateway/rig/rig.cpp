@@ -139,6 +139,34 @@ absl::StatusOr<std::optional<session::JournalTouch>> Rig::FindDone(
   return touch;
 }
 
+absl::StatusOr<arm::PlannedTouch> Rig::Admit(const source::TouchCommand& command, calibration::UpFace up_face,
+                                             const source::MotionGuard& guard) {
+  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
+  if (const effector::EffectorState effector = parts_.effector->State(); !effector.connected)
+    return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
+  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
+  return parts_.planner->Plan(from, command.object, command.bounds, up_face, command.touch,
+                              "touch '" + command.id + "'");
+}
+
+absl::Status Rig::Refused(const source::TouchCommand& command, const absl::Status& why) {
+  const std::string refusal = absl::StrCat(command.session, "\n", command.id, "\n", why.message());
+  {
+    // A client that asks in a loop does not fill the disk.
+    std::lock_guard<std::mutex> lock(status_mutex_);
+    if (refusal == last_refusal_) return why;
+    last_refusal_ = refusal;
+  }
+  audit()
+      .Write("touch_refused", {{"session", command.session},
+                               {"id", command.id},
+                               {"code", absl::StatusCodeToString(why.code())},
+                               {"why", std::string(why.message())}})
+      .IgnoreError();
+  return why;
+}
+
 absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& command,
                                                  const source::MotionGuard& caller) {
   const source::MotionGuard guard = UntilStopped(caller);
@@ -146,20 +174,17 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
   unwritten_.Flush();
   TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<session::JournalTouch> known, FindDone(command));
   if (known.has_value()) return *std::move(known);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto lock, TakeRig(guard));
+  auto taken = TakeRig(guard);
+  if (!taken.ok()) return Refused(command, taken.status());
+  const auto lock = *std::move(taken);
   TOUCHSTONE_ASSIGN_OR_RETURN(known, FindDone(command));  // made while this one waited
   if (known.has_value()) return *std::move(known);
 
   // Everything that can forbid it, before anything is written or moved.
-  TOUCHSTONE_RETURN_IF_ERROR(ReadyToMove(guard));
-  if (const effector::EffectorState effector = parts_.effector->State(); !effector.connected)
-    return absl::UnavailableError(absl::StrCat("the end effector is not there: ", effector.why));
   const calibration::UpFace up_face = calibration::UpFaceFor(command.touch.approach);
-  TOUCHSTONE_RETURN_IF_ERROR(EnsureMounted(command.object, up_face, guard));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState from, parts_.arm->State());
-  TOUCHSTONE_ASSIGN_OR_RETURN(arm::PlannedTouch plan,
-                              parts_.planner->Plan(from, command.object, command.bounds, up_face,
-                                                   command.touch, "touch '" + command.id + "'"));
+  absl::StatusOr<arm::PlannedTouch> admitted = Admit(command, up_face, guard);
+  if (!admitted.ok()) return Refused(command, admitted.status());
+  const arm::PlannedTouch plan = *std::move(admitted);
 
   const double began_s = NowS(), began_unix_s = timing::UnixNowS();
   // Whatever else is written for it goes before: once it is executing, only its end is left to write.
@@ -183,6 +208,7 @@ absl::StatusOr<session::JournalTouch> Rig::Touch(const source::TouchCommand& com
     audit()
         .Write("touch_failed", {{"session", command.session},
                                 {"id", command.id},
+                                {"code", absl::StatusCodeToString(result.status().code())},
                                 {"why", std::string(result.status().message())}})
         .IgnoreError();
     return result.status();

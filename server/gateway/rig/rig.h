@@ -176,6 +176,11 @@ class Rig : public source::RigDevice {
   absl::StatusOr<std::unique_lock<std::timed_mutex>> TakeRig(const source::MotionGuard& guard);
   // Why the arm may not move now for somebody whose guard this is; OK: it may.
   absl::Status ReadyToMove(const source::MotionGuard& guard);
+  // The path of a touch, if nothing forbids it; nothing but the object was moved.
+  absl::StatusOr<arm::PlannedTouch> Admit(const source::TouchCommand& command, calibration::UpFace up_face,
+                                          const source::MotionGuard& guard);
+  // Notes in the audit log why a touch did not begin, once for each that is refused again and again; returns why.
+  absl::Status Refused(const source::TouchCommand& command, const absl::Status& why);
   absl::Status PowerUp(const source::MotionGuard& guard);
   absl::Status EnsureMounted(const std::string& object, calibration::UpFace up_face,
                              const source::MotionGuard& guard);
@@ -261,6 +266,7 @@ class Rig : public source::RigDevice {
   std::atomic<uint32_t> motions_{0};  // under way
   mutable std::mutex status_mutex_;
   source::SourceStatus status_;
+  std::string last_refusal_;                    // session, id and why
   std::optional<calibration::UpFace> up_face_;  // of the object on the fixture
   std::mutex sessions_mutex_;
   std::string last_session_;  // whose fingers and spacing are this rig's
