@@ -46,10 +46,9 @@ TEST_F(SessionsCommandTest, DiagnoseNamesTheValueThatChangedAndSavesTheLastModel
   const Outcome outcome =
       Run({"diagnose", "monday.csv", "friday.csv", "--model", "nominal.yaml", "--save-model", "better.yaml"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out,
-              AllOf(HasSubstr("2 sessions, 144 touches"), HasSubstr("MISSING_EFFECTS"),
-                    HasSubstr("Changed: tip_radius radius_mm from"), HasSubstr("in friday.csv"),
-                    HasSubstr("changed by +")));
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("2 sessions, 144 touches"), HasSubstr("MISSING_EFFECTS"),
+                                 HasSubstr("Changed: tip_radius radius_mm from"), HasSubstr("in friday.csv"),
+                                 HasSubstr("changed by +")));
   // The saved model is that of Friday: a comparison of both finds it right there, and off on Monday.
   const auto compared = nlohmann::json::parse(
       Run({"compare", "monday.csv", "friday.csv", "--model", "better.yaml", "--json", "-"}).out);

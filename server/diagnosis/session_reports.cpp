@@ -406,7 +406,7 @@ class SessionsReporter {
   std::vector<report::Diagnosis> alone_;                               // of every session by itself
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
   joint::ClaimedEffects claimed_;                                      // likewise
-  std::vector<int> unexplained_;           // sessions with a rest under their own models
+  std::vector<int> unexplained_;                    // sessions with a rest under their own models
   bool noise_moved_ = false;                        // a session has another noise than the given model
   std::vector<report::Step> noise_steps_;           // kinds of noise that a session shows
   std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all

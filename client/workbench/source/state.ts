@@ -25,6 +25,11 @@ export const hasImproved = computed(() => !!page.value?.report.improved_model_ya
 export const touchEntries = computed(() =>
   (page.value?.report.data ?? []).map((data, index) => ({ data, index })).filter(({ data }) => data.touch_table));
 export const entry = computed(() => touchEntries.value.find(({ index }) => index === session.value) ?? touchEntries.value.find(({ index }) => index === page.value?.words.main) ?? touchEntries.value[0]);
+// Entries that the views show: of several sessions the one that is chosen.
+export const shownData = computed(() => {
+  const report = page.value?.report;
+  return !report ? [] : report.sessions && entry.value ? [entry.value.data] : report.data;
+});
 export const touches = computed(() => (entry.value ? new Touches(entry.value.data) : null));
 
 // Half the width of the colours' scale: of the given model, so that colours before and after mean the same.

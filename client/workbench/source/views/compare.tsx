@@ -3,7 +3,7 @@ import { Key, Section, Table } from "../parts/parts";
 import { Plot, type Mark } from "../charts/plot";
 import { type Range, rangeOf } from "../charts/scale";
 import { count, covariate, covariateName, error, fixed, probability, signedError, unitFor } from "../format";
-import { covariate as by, entry, hasImproved, improved, object, page, parity, ranked, selectTouch, shown, shownCovariate, touchIndex, touches } from "../state";
+import { shownData, covariate as by, entry, hasImproved, improved, object, parity, ranked, selectTouch, shown, shownCovariate, touchIndex, touches } from "../state";
 import { fingerColour } from "../colour";
 import type { Touches } from "../data/touches";
 import type { DataReport, Histogram, Kind } from "../data/report";
@@ -100,8 +100,7 @@ function HistogramPlot({ data, one }: { data: DataReport; one: Histogram }) {
 }
 
 export function Histograms() {
-  const { report } = page.value!;
-  const known = report.data.filter((data) => data.histograms.some((one) => one.edges.length > 1));
+  const known = shownData.value.filter((data) => data.histograms.some((one) => one.edges.length > 1));
   if (!known.length) return null;
   const keys = [{ colour: "var(--area)", text: "measured" }, { colour: "var(--given)", text: "given model" }, ...(hasImproved.value ? [{ colour: "var(--better)", text: "improved model" }] : [])];
   return (

@@ -1,7 +1,7 @@
 // What to measure next, sets without poses, the data behind the report, how the numbers came about, how to make it again.
 import { Code, Section, Table, Terms } from "../parts/parts";
 import { count, error, fixed, isPictures, join, number, probability, readings, signedError, typeset, unitFor } from "../format";
-import { entry, page, selectTouch, touches } from "../state";
+import { shownData, entry, page, selectTouch, touches } from "../state";
 import type { DataReport } from "../data/report";
 
 export function Next() {
@@ -91,7 +91,7 @@ function OneSet({ data, index }: { data: DataReport; index: number }) {
 export function Data() {
   const { report, words } = page.value!;
   if (!report.data.length) return null;
-  return <Section id="data" title="The data">{report.data.map((data, i) => <>{report.data.length > 1 && <h3>{words.of_data[i].kind_name}</h3>}<OneSet data={data} index={i} /></>)}</Section>;
+  return <Section id="data" title="The data">{shownData.value.map((data) => { const i = report.data.indexOf(data); return <>{shownData.value.length > 1 && <h3>{words.of_data[i].kind_name}</h3>}<OneSet data={data} index={i} /></>; })}</Section>;
 }
 
 const methods: [string, string][] = [

@@ -3,7 +3,7 @@ import { Bar, Key, Section, Table } from "../parts/parts";
 import { Plot, type Mark } from "../charts/plot";
 import { rangeOf } from "../charts/scale";
 import { count, covariate, error, probability, readings, share, signedError, typeset, unitFor } from "../format";
-import { entry, finger, hasImproved, object, page, slice, touches } from "../state";
+import { shownData, entry, finger, hasImproved, object, page, slice, touches } from "../state";
 import { fingerColour } from "../colour";
 import type { Curve, DataReport, Group } from "../data/report";
 
@@ -112,13 +112,13 @@ function Curves({ data }: { data: DataReport }) {
 
 export function Where() {
   const { data } = page.value!.report;
-  const known = data.filter((one) => one.where.length || one.groups.length || one.curves.length);
+  const known = shownData.value.filter((one) => one.where.length || one.groups.length || one.curves.length);
   if (!known.length) return null;
   return (
     <Section id="where" title="Where" lead={touches.value ? "The parts of the data in which the given model is wrong, the worst first. Choose one: every view shows it alone." : "The parts of the data in which the given model is wrong, the worst first."}>
       {known.map((one) => {
         const linked = entry.value?.data === one;
-        return <>{data.length > 1 && <h3>{page.value!.words.of_data[data.indexOf(one)].kind_name}</h3>}<Slices data={one} linked={linked} /></>;
+        return <>{shownData.value.length > 1 && <h3>{page.value!.words.of_data[data.indexOf(one)].kind_name}</h3>}<Slices data={one} linked={linked} /></>;
       })}
       <p class="note">Excess: the mean square error of the given model beyond the noise floor. Residuals are measured minus simulated: positive means that the real contact came later, or the picture is brighter, than the model says.</p>
     </Section>
@@ -127,11 +127,11 @@ export function Where() {
 
 export function Detail() {
   const { data } = page.value!.report;
-  const known = data.filter((one) => one.groups.length || one.curves.length);
+  const known = shownData.value.filter((one) => one.groups.length || one.curves.length);
   if (!known.length) return null;
   return (
     <Section id="detail" title="Groups and covariates">
-      {known.map((one) => <>{data.length > 1 && <h3>{page.value!.words.of_data[data.indexOf(one)].kind_name}</h3>}<Groups data={one} linked={entry.value?.data === one} /><Curves data={one} /></>)}
+      {known.map((one) => <>{shownData.value.length > 1 && <h3>{page.value!.words.of_data[data.indexOf(one)].kind_name}</h3>}<Groups data={one} linked={entry.value?.data === one} /><Curves data={one} /></>)}
     </Section>
   );
 }

@@ -3,7 +3,7 @@ import { Bar, Code, IntervalPicture, Key, Section, Table, Terms } from "../parts
 import { Plot, type Mark } from "../charts/plot";
 import { rangeOf } from "../charts/scale";
 import { covariate, covariateName, effectProbability, error, interval, join, number, probability, readings, share, typeset, valueName, withError } from "../format";
-import { page } from "../state";
+import { shownData, page } from "../state";
 import { fingerColour } from "../colour";
 import type { Candidate, DataReport } from "../data/report";
 
@@ -106,11 +106,11 @@ function Rest({ data, nearest }: { data: DataReport; nearest: string }) {
 
 export function Unexplained() {
   const { report, words } = page.value!;
-  const known = report.data.map((data, i) => ({ data, about: words.of_data[i] })).filter(({ data: { unexplained: rest } }) => rest.words || rest.covariates.length || rest.formula || rest.curve || rest.lookup_yaml);
+  const known = shownData.value.map((data) => ({ data, about: words.of_data[report.data.indexOf(data)] })).filter(({ data: { unexplained: rest } }) => rest.words || rest.covariates.length || rest.formula || rest.curve || rest.lookup_yaml);
   if (!known.length) return null;
   return (
     <Section id="unexplained" title="What no built-in effect explains" lead="A structure that is left after all steps. p: likelihood ratio of the best term, all terms paid for.">
-      {known.map(({ data, about }) => <>{report.data.length > 1 && <h3>{about.kind_name}</h3>}<Rest data={data} nearest={about.nearest_effect} /></>)}
+      {known.map(({ data, about }) => <>{known.length > 1 && <h3>{about.kind_name}</h3>}<Rest data={data} nearest={about.nearest_effect} /></>)}
     </Section>
   );
 }
