@@ -5,15 +5,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <iostream>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <random>
-#include <set>
 
-#include "client/cli/journal_session.h"
-#include "client/cli/session_images.h"
+#include "client/cli/named_set.h"
+#include "client/cli/set_meshes.h"
 #include "client/cli/terminal.h"
 #include "client/report/report.h"
 #include "client/workbench/page.h"
@@ -24,9 +21,6 @@
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/evidence.h"
-#include "server/service/measured_set_message.h"
-#include "server/session/image_set_file.h"
-#include "server/session/measurement_set.h"
 
 namespace touchstone::cli {
 namespace {
@@ -34,196 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint64_t kMaxTermsBytes = 1 << 20;
-constexpr size_t kMaxInline = 16 << 20;  // a larger set is sent in pieces, as a session
 constexpr size_t kPiece = 1 << 20;
-// Of a folder with many meshes, those that the set does not name: so many are tried as what was touched.
-constexpr size_t kMaxFurtherMeshes = 12;
-constexpr uint64_t kMaxFurtherBytes = 32 << 20;
-
-// A set as the user names it: its file's text, the name of a session that the server keeps, what a rig's journal
-// holds, or the files of a folder of photographs (with the text of its touches.csv, if it has one).
-struct NamedSet {
-  std::string csv, session;
-  std::optional<session::MeasurementSet> measured;
-  std::optional<v1::ImageSetFiles> images;
-  std::string images_sha256;
-};
-
-absl::StatusOr<NamedSet> ReadFolder(const std::string& folder) {
-  NamedSet set;
-  TOUCHSTONE_ASSIGN_OR_RETURN(set.images, session::ReadImageSetFiles(folder));
-  if (session::HasTouches(folder)) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, ReadFile((fs::path(folder) / session::kTouchesCsv).string()));
-  }
-  return set;
-}
-
-// What messages call it.
-std::string OriginOf(const std::string& text, const NamedSet& set) {
-  if (!set.session.empty()) return "";
-  if (text == "-") return "stdin";
-  return set.images ? (fs::path(text) / session::kTouchesCsv).string() : text;
-}
-
-// Puts the touches into the evidence; what is too large for one request stays in set->csv.
-absl::Status SetMeasurements(const std::string& text, NamedSet* set, v1::Evidence* evidence) {
-  if (!set->session.empty()) {
-    evidence->set_session(set->session);
-    return absl::OkStatus();
-  }
-  if (set->measured.has_value()) {
-    *evidence->mutable_set() = service::ToProto(*set->measured);
-    if (evidence->set().ByteSizeLong() <= kMaxInline) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(set->csv, JournalCsv(text, ""));
-  }
-  if (set->csv.size() > kMaxInline) return absl::OkStatus();
-  evidence->set_csv(std::move(set->csv));
-  set->csv.clear();
-  return absl::OkStatus();
-}
-
-void AddObjects(const std::vector<std::string>& more, std::vector<std::string>* objects) {
-  for (const std::string& object : more)
-    if (std::find(objects->begin(), objects->end(), object) == objects->end()) objects->push_back(object);
-}
-
-// Its objects, those of the touches first. Reads all, so that errors name files here.
-absl::StatusOr<std::vector<std::string>> ObjectsOf(const std::string& origin, NamedSet* set) {
-  std::vector<std::string> objects;
-  if (set->measured.has_value()) objects = set->measured->objects;
-  if (!set->csv.empty()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet read,
-                                session::ParseMeasurementSet(set->csv, origin));
-    objects = read.objects;
-  }
-  if (!set->images) return objects;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::ImageSet read, session::ParseImageSet(*set->images));
-  set->images_sha256 = read.sha256;
-  AddObjects(read.objects, &objects);
-  return objects;
-}
-
-absl::StatusOr<NamedSet> ReadSet(const Cli& cli, const std::string& text) {
-  NamedSet set;
-  if (text == "-") {
-    set.csv.assign(std::istreambuf_iterator<char>(std::cin), {});
-    return set;
-  }
-  if (std::error_code error; fs::is_directory(text, error)) return ReadFolder(text);
-  if (IsHdf5Path(text)) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(service::StoredSession stored, ReadImageSession(text));
-    set.images = std::move(stored.images), set.csv = std::move(stored.csv);
-    return set;
-  }
-  // A rig's journal with one session is as good as its measurement file.
-  if (IsJournalPath(text)) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(set.images, JournalPhotographs(cli, text));
-    if (set.images) return set;
-    TOUCHSTONE_ASSIGN_OR_RETURN(set.measured, JournalSet(text));
-    return set;
-  }
-  std::error_code error;
-  const bool looks_like_file = absl::StrContains(text, "/") || absl::EndsWith(text, ".csv");
-  if (!cli.source().servers.empty() && !looks_like_file && !fs::exists(text, error)) {
-    set.session = text;
-    return set;
-  }
-  TOUCHSTONE_ASSIGN_OR_RETURN(set.csv, ReadFile(text));
-  return set;
-}
-
-// Meshes that the set does not name, as far as they can be read: nobody asked for them, so none stops the command.
-void AddFurtherMeshes(const Cli& cli, const std::map<std::string, std::string>& paths,
-                      std::map<std::string, source::MeshSpec>* meshes) {
-  size_t taken = 0;
-  uint64_t bytes = 0;
-  std::vector<std::string> left_out;
-  for (const auto& [name, path] : paths) {
-    if (meshes->count(name) > 0) continue;
-    std::error_code error;
-    const uint64_t size = fs::file_size(path, error);
-    if (error || taken == kMaxFurtherMeshes || bytes + size > kMaxFurtherBytes) {
-      left_out.push_back(name);
-      continue;
-    }
-    if (!geometry::ReadMeshFile(path).ok()) continue;
-    bytes += size, ++taken;
-    source::MeshSpec source;
-    source.name = name;
-    source.path = path;
-    meshes->emplace(name, source);
-  }
-  if (!left_out.empty())
-    cli.Detail(absl::StrCat("--mesh-dir: ", left_out.size(), " further meshes (", left_out[0],
-                            left_out.size() > 1 ? ", ..." : "",
-                            ") are not tried as the mesh of another object; --mesh NAME=FILE adds one"));
-}
-
-// The mesh files of these objects in --mesh-dir. Other files there are left alone, or, with `further`, taken as far as
-// the bounds allow.
-absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
-                               const std::vector<std::string>& objects, bool further,
-                               std::map<std::string, source::MeshSpec>* meshes) {
-  const std::vector<std::string> formats = geometry::MeshFormatNames();
-  std::map<std::string, std::string> paths, others;
-  std::set<std::string> twice;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().stem().string();
-    const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
-    if (extension.empty() || std::find(formats.begin(), formats.end(), extension.substr(1)) == formats.end())
-      continue;
-    if (std::find(objects.begin(), objects.end(), name) == objects.end()) {
-      others.emplace(name, entry.path().string());
-      continue;
-    }
-    const auto [other, is_new] = paths.emplace(name, entry.path().string());
-    if (is_new || meshes->count(name) > 0) continue;
-    // The same object in two formats: the format that MeshFormatNames names first, and a note to the user.
-    const auto rank = [&](const fs::path& path) {
-      return std::find(formats.begin(), formats.end(),
-                       absl::AsciiStrToLower(path.extension().string()).substr(1)) -
-             formats.begin();
-    };
-    if (rank(entry.path()) < rank(other->second)) other->second = entry.path().string();
-    twice.insert(name);
-  }
-  if (error) return absl::NotFoundError(absl::StrCat("--mesh-dir: '", folder, "': ", error.message()));
-  for (const std::string& name : twice)
-    cli.Log(absl::StrCat("note: --mesh-dir: several files are named '", name, "'; ", paths[name],
-                         " is taken (--mesh ", name, "=FILE takes another)"));
-  for (const auto& [name, path] : paths) {
-    source::MeshSpec source;
-    source.name = name;
-    source.path = path;
-    meshes->emplace(name, source);  // --mesh comes first
-  }
-  if (further) AddFurtherMeshes(cli, others, meshes);
-  return absl::OkStatus();
-}
-
-// The meshes that the set's objects need, of those that the options name, and what --mesh names beside.
-absl::StatusOr<std::vector<source::MeshSpec>> MeshesOf(const Cli& cli,
-                                                       const std::vector<std::string>& objects,
-                                                       bool further) {
-  std::map<std::string, source::MeshSpec> meshes;
-  for (const std::string& text : cli.source().meshes) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const source::MeshSpec source, service::ParseMeshSpec(text));
-    if (!meshes.emplace(source.name, source).second)
-      return absl::InvalidArgumentError(
-          absl::StrCat("--mesh: two are named '", source.name, "'; one per object was expected"));
-    if (std::find(objects.begin(), objects.end(), source.name) == objects.end()) {
-      // Kept: it may be what was touched under another name.
-      cli.Log(absl::StrCat("note: --mesh ", text, ": the set has no such object",
-                           DidYouMean(source.name, objects)));
-    }
-  }
-  if (!cli.source().mesh_folder.empty())
-    TOUCHSTONE_RETURN_IF_ERROR(AddMeshesOfFolder(cli, cli.source().mesh_folder, objects, further, &meshes));
-  std::vector<source::MeshSpec> list;
-  for (const auto& [name, source] : meshes) list.push_back(source);
-  return list;
-}
 
 // A model as the user names it; a file is read, so that errors name it.
 absl::StatusOr<v1::ModelRef> ReadModel(const std::string& text) {
@@ -335,7 +140,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
     if (!sets[i].session.empty() || !(sets[i].images || has_meshes)) continue;
     const std::string origin = i == 0 ? evidence.origin() : comparison->further_[i - 1].origin();
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> own, ObjectsOf(origin, &sets[i]));
-    AddObjects(own, &objects);
+    AppendObjects(own, &objects);
   }
   std::vector<source::MeshSpec> meshes;
   const bool stored =
@@ -350,7 +155,7 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
       if (set.session.empty()) continue;
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::string> own,
                                   comparison->ObjectsOfStored(set.session));
-      AddObjects(own, &objects);
+      AppendObjects(own, &objects);
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(meshes, MeshesOf(cli, objects, options.further_meshes));
   }

@@ -140,7 +140,8 @@ void AddDiagnose(Cli* cli) {
       "touchstone diagnose set.csv --model nominal.yaml --mesh-dir meshes --server 127.0.0.1:50051",
       [cli, options] { return RunDiagnose(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/true);
-  cli->AddOutput(command, "--save-model", &options->save_model, "Write the improved model to this file");
+  cli->AddOutput(command, "--save-model", &options->save_model,
+                 "Write the improved model to this file; of several sessions that of the last");
   command->add_flag("--with-formula", options->with_formula,
                     "With --save-model: add the suggested formula, or the curve, of what no built-in effect "
                     "explains");

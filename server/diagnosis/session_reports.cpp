@@ -10,6 +10,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/report/from_sessions.h"
 #include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/report/join.h"
 #include "server/diagnosis/report/summary.h"
@@ -299,30 +300,7 @@ class SessionsReporter {
 
   void AddSteps() {
     for (const joint::SessionStep& found : changes().steps) {
-      report::Step step;
-      step.effect = found.effect;
-      step.equivalent = found.equivalent;
-      step.probability = found.probability;
-      step.gain_nats = found.gain_nats;
-      step.parameters = found.parameters;
-      step.model = found.models.back();
-      for (const model::EffectInstance& instance : step.model.effects)
-        if (engine::NameOf(*instance.effect) == found.effect) {
-          step.scope = instance.per_object ? engine::EffectScope::kObject : engine::EffectScope::kRig;
-          engine::AddTexts(*instance.effect, &step);
-        }
-      for (const joint::ComparedEffect& compared : changes().effects)
-        if (compared.effect == found.effect && compared.values == joint::SessionValues::kOwn) {
-          engine::AddWords(absl::StrCat("Changed between the sessions: the values are those of ",
-                                        Name(taking_part().back()), "."),
-                           &step);
-          break;
-        }
-      if (!step.equivalent.empty()) {
-        std::vector<std::string> names = step.equivalent;
-        names.insert(names.begin(), step.effect);
-        step.discriminating_measurement = engine::DiscriminatingMeasurement(names);
-      }
+      report::Step step = report::StepOfSessions(found, changes(), Name(taking_part().back()));
       engine::AddConfounded(step, &diagnosis_.confounded);
       diagnosis_.steps.push_back(std::move(step));
     }
@@ -370,34 +348,8 @@ class SessionsReporter {
   }
 
   void Summarize() {
-    report::Sessions& sessions = *diagnosis_.sessions;
-    sessions.words = report::SessionsInWords(sessions, diagnosis_.data);
-    std::vector<std::string> sentences;
-    for (int s = 0; s < count(); ++s) {
-      const report::DataReport& data = diagnosis_.data[s];
-      if (!data.initial) continue;
-      const bool better = data.final && data.final->rmse < data.initial->rmse;
-      sentences.push_back(absl::StrCat(
-          "In ", Name(s), " the model is off by ", report::ErrorInWords(data.kind, data.initial->rmse),
-          better ? absl::StrCat(", and by ", report::ErrorInWords(data.kind, data.final->rmse),
-                                " with what is found")
-                 : "",
-          "."));
-    }
-    for (const report::Step& step : diagnosis_.steps)
-      sentences.push_back(
-          absl::StrCat("Missing: ", step.effect, " (", report::ValuesInWords(step.parameters), ")."));
-    for (const auto& [session, effect] : still_)
-      sentences.push_back(absl::StrCat(Name(session), " alone asks for ", effect,
-                                       " beside it, which the other sessions do not show."));
-    if (!unexplained_.empty() && sessions.changes && sessions.changes->changed()) {
-      std::vector<std::string> names;
-      for (const int s : unexplained_) names.push_back(Name(s));
-      absl::StrAppend(&sessions.words, " In ", absl::StrJoin(names, " and "),
-                      " a rest remains that no effect explains: what changed may stand in for it.");
-    }
-    if (!sessions.words.empty()) sentences.push_back(sessions.words);
-    diagnosis_.summary = absl::StrJoin(sentences, " ");
+    diagnosis_.sessions->words = report::SessionsInWords(*diagnosis_.sessions, diagnosis_.data, unexplained_);
+    diagnosis_.summary = report::SummarizeSessions(diagnosis_, still_);
   }
 
   const std::vector<DiagnosisInput>& sessions_;
@@ -406,10 +358,10 @@ class SessionsReporter {
   std::vector<report::Diagnosis> alone_;                               // of every session by itself
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
   joint::ClaimedEffects claimed_;                                      // likewise
-  std::vector<int> unexplained_;                    // sessions with a rest under their own models
-  bool noise_moved_ = false;                        // a session has another noise than the given model
-  std::vector<report::Step> noise_steps_;           // kinds of noise that a session shows
-  std::vector<std::pair<int, std::string>> still_;  // an effect that one session asks for beside all
+  std::vector<int> unexplained_;           // sessions with a rest under their own models
+  bool noise_moved_ = false;               // a session has another noise than the given model
+  std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
+  std::vector<report::AskedByOne> still_;
 };
 
 }  // namespace

@@ -71,7 +71,8 @@ std::string SessionName(const std::vector<DataReport>& data, int session) {
   return FileLabel(paths, session);
 }
 
-std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data) {
+std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data,
+                            const std::vector<int>& unexplained) {
   std::vector<std::string> sentences;
   if (sessions.changes) {
     for (const joint::ComparedEffect& effect : sessions.changes->effects)
@@ -94,6 +95,35 @@ std::string SessionsInWords(const Sessions& sessions, const std::vector<DataRepo
         : sessions.changes     ? ": something changed that no value of the model describes."
                                : ": the sessions differ, whatever the model."));
   }
+  if (!unexplained.empty() && sessions.changes && sessions.changes->changed()) {
+    std::vector<std::string> names;
+    for (const int session : unexplained) names.push_back(SessionName(data, session));
+    sentences.push_back(
+        absl::StrCat("In ", absl::StrJoin(names, " and "),
+                     " a rest remains that no effect explains: what changed may stand in for it."));
+  }
+  return absl::StrJoin(sentences, " ");
+}
+
+std::string SummarizeSessions(const Diagnosis& diagnosis, const std::vector<AskedByOne>& asked) {
+  std::vector<std::string> sentences;
+  for (size_t s = 0; s < diagnosis.data.size(); ++s) {
+    const DataReport& data = diagnosis.data[s];
+    if (!data.initial) continue;
+    const bool better = data.final && data.final->rmse < data.initial->rmse;
+    sentences.push_back(absl::StrCat(
+        "In ", SessionName(diagnosis.data, static_cast<int>(s)), " the model is off by ",
+        ErrorInWords(data.kind, data.initial->rmse),
+        better ? absl::StrCat(", and by ", ErrorInWords(data.kind, data.final->rmse), " with what is found")
+               : "",
+        "."));
+  }
+  for (const Step& step : diagnosis.steps)
+    sentences.push_back(absl::StrCat("Missing: ", step.effect, " (", ValuesInWords(step.parameters), ")."));
+  for (const AskedByOne& one : asked)
+    sentences.push_back(absl::StrCat(SessionName(diagnosis.data, one.session), " alone asks for ", one.effect,
+                                     " beside it, which the other sessions do not show."));
+  if (!diagnosis.sessions->words.empty()) sentences.push_back(diagnosis.sessions->words);
   return absl::StrJoin(sentences, " ");
 }
 

@@ -27,7 +27,16 @@ std::string Summarize(const Diagnosis& diagnosis, bool others_in_place = false);
 // Poses that two sessions touched differ beyond noise: P below which that is no chance.
 inline constexpr double kSamePosesP = 1e-4;
 // What changed between sessions, and whether the poses that they share agree: a few sentences.
-std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data);
+// `unexplained`: sessions with a rest under their own models.
+std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data,
+                            const std::vector<int>& unexplained);
+// An effect that one session asks for beside what all sessions show.
+struct AskedByOne {
+  int session = 0;  // place in Diagnosis::data
+  std::string effect;
+};
+// One paragraph of several sessions: how wrong in each, what is missing, what changed.
+std::string SummarizeSessions(const Diagnosis& diagnosis, const std::vector<AskedByOne>& asked);
 // What messages call the session: its file's name, or its path where two files have one name.
 std::string SessionName(const std::vector<DataReport>& data, int session);
 
