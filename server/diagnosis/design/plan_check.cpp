@@ -35,10 +35,12 @@ absl::StatusOr<double> NoiseOf(const selection::Workspace& workspace) {
   reported.time_s = drawn;
   const double sigma_s = touches::Rmse(reported, touches::Residuals(reported, workspace.nominal));
   if (sigma_s > 0) return sigma_s;
-  return absl::InvalidArgumentError(absl::StrCat("the model '", model.name,
-                                                 "' has no noise, and without noise every effect is found at "
-                                                 "any size: give the noise of one finger's time "
-                                                 "(--noise 5, in us), or add gaussian_noise to the model"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("the model '", model.name,
+                   "' has no noise, and without noise every effect is found at "
+                   "any size: add gaussian_noise to the model (touchstone model "
+                   "add MODEL gaussian_noise sigma_us=5000), or give `touchstone "
+                   "check` the noise of one finger's time (--noise 5000, in us)"));
 }
 
 absl::Status CheckQuestion(const PlanQuestion& question) {
