@@ -88,7 +88,7 @@ install_python_test_packages() {
 # An environment of its own with PyPI's current gRPC, protobuf and NumPy beside Grain, Ray and datasets, which need them: for
 # test_grain.py, test_ray.py and test_formats.py of client/python/tests. Where PyPI cannot be reached those are skipped, and say so.
 install_current_python() {
-  local wanted='grain==0.2.18 ray[data]==2.60.0 grpcio==1.85.1 protobuf==7.36.2 numpy==2.4.6 datasets==5.2.0' into=$root/build/current_venv
+  local wanted='grain==0.2.18 ray[data]==2.60.0 grpcio==1.85.1 protobuf==7.36.2 numpy==2.4.6 datasets==5.2.0 pillow==12.0.0' into=$root/build/current_venv
   if [[ ! -f $into/installed || $(< "$into/installed") != "$wanted" ]]; then
     rm -rf "$into"
     /usr/bin/python3 -m venv "$into" || return

@@ -258,6 +258,8 @@ TEST_F(EmulatedArm, StopsWithoutTheStateLink) {
   Heart heart(arm_.get(), &clock_);
   ASSERT_TRUE(Start(SomeTouch(12)).ok());
   ASSERT_TRUE(WaitForProgram(12));
+  // At rest it would be before the motion begins too.
+  ASSERT_TRUE(Wait([&] { return controller_->Moving(); }));
   faults_.Set("disconnect", 1);
   // Whatever is up again first carries it.
   EXPECT_TRUE(Wait([&] { return arm_->Stop().ok(); }));

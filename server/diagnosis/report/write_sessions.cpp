@@ -95,10 +95,10 @@ void WriteSessions(const Sessions& sessions, v1::SessionComparison* message) {
     to->set_from_session(static_cast<uint32_t>(pair.from));
     to->set_to_session(static_cast<uint32_t>(pair.to));
     to->set_poses(static_cast<uint32_t>(pair.measured.poses));
-    to->set_rms_us(Microseconds(pair.measured.rms_s));
-    to->set_expected_us(Microseconds(pair.measured.expected_s));
+    to->set_rms(Microseconds(pair.measured.rms_s));
+    to->set_expected(Microseconds(pair.measured.expected_s));
     to->set_p(pair.measured.p);
-    to->set_rms_after_us(Microseconds(pair.left.rms_s));
+    to->set_rms_after(Microseconds(pair.left.rms_s));
     to->set_p_after(pair.left.p);
   }
   message->set_words(sessions.words);

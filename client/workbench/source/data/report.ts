@@ -125,7 +125,7 @@ export interface ComparedEffect {
 
 export interface SessionComparison {
   effects: ComparedEffect[]; model_yaml: string[]; words: string;
-  same_poses: { from_session: number; to_session: number; poses: number; rms_us: number; expected_us: number; p: number; rms_after_us: number; p_after: number }[];
+  same_poses: { from_session: number; to_session: number; poses: number; rms: number; expected: number; p: number; rms_after: number; p_after: number }[];
 }
 
 export interface Report {
