@@ -208,6 +208,7 @@ void AddCheck(Cli* cli);
 void AddRehearse(Cli* cli);
 void AddExplain(Cli* cli);
 void AddHistory(Cli* cli);
+void AddModelPromote(Cli* cli, CLI::App* group);
 void AddPropose(Cli* cli);
 void AddWorkbench(Cli* cli);
 void AddSession(Cli* cli);

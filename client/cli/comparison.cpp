@@ -61,16 +61,18 @@ void AddComparisonOptions(Cli* cli, CLI::App* command, ComparisonOptions* option
                                         : ""));
     set->required(options->set_required)->expected(options->set_required ? 1 : 0, options->max_sets);
   }
-  CLI::Option* model = add_input(
-      "--model", options->models, "MODEL",
-      options->max_models > 1
-          ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
-          : "Model file, name or hash. Default: the source's own");
-  model->take_all()->expected(1);
-  add_input("--also", options->also, "FILE",
-            "A file of your own effects (formulas) that compete with the catalogue, repeatable")
-      ->take_all()
-      ->expected(1);
+  if (options->takes_models) {
+    CLI::Option* model = add_input(
+        "--model", options->models, "MODEL",
+        options->max_models > 1
+            ? "Model file, name or hash. Default: the source's own. Given twice: which of the two errs less"
+            : "Model file, name or hash. Default: the source's own");
+    model->take_all()->expected(1);
+    add_input("--also", options->also, "FILE",
+              "A file of your own effects (formulas) that compete with the catalogue, repeatable")
+        ->take_all()
+        ->expected(1);
+  }
   command->add_option("--seed", options->seed, "Seed of permutations and draws. Default: 0")->type_name("N");
   if (html)
     cli->AddOutput(command, "--html", &options->html, "Write the report as one HTML file that opens offline");

@@ -35,6 +35,7 @@ struct ComparisonOptions {
   std::string json;
   bool set_required = true;
   bool takes_sets = true;                  // false: the command finds the sets by itself
+  bool takes_models = true;                // ... the models, and there are none that compete
   std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 

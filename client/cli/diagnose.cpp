@@ -27,6 +27,27 @@ std::string SuggestedModel(const v1::Report& report) {
   return "";
 }
 
+// What the improved model was fitted to: each set, with the errors of the given model and of this one. `suggested`: with
+// the formula or curve of what no effect explains.
+model::Provenance FittedTo(const v1::Report& report, bool suggested) {
+  model::Provenance provenance;
+  provenance.over_name = report.model_name();
+  provenance.over_hash = report.model_hash();
+  const v1::Provenance& from = report.provenance();
+  for (int i = 0; i < report.data_size(); ++i) {
+    const v1::DataReport& data = report.data(i);
+    if (!(data.initial().rmse() > 0)) continue;
+    model::UsedSet& set = provenance.fitted_to.emplace_back();
+    set.set = data.session();
+    set.sha256 = i < from.session_sha256_size() ? from.session_sha256(i) : i == 0 ? from.set_sha256() : "";
+    set.unit = data.unit();
+    set.rmse_before = data.initial().rmse();
+    set.rmse_after =
+        suggested && data.unexplained().rmse() > 0 ? data.unexplained().rmse() : data.final().rmse();
+  }
+  return provenance;
+}
+
 // The improved model under the file's name, or the model itself where nothing had to change.
 absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1::Report& report,
                        Comparison* comparison) {
@@ -51,7 +72,9 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   model.name = std::filesystem::path(options.save_model).stem().string();
   if (!model::ParseModel(model::FormatModel(model), options.save_model, effects::Catalogue()).ok())
     model.name = as_it_was.name;
-  TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", options.save_model, model));
+  TOUCHSTONE_RETURN_IF_ERROR(
+      WriteModel(cli, "--save-model", options.save_model, model,
+                 changed || suggested ? FittedTo(report, suggested) : model::Provenance()));
   const std::string hash = model.Hash().substr(0, 12);
   cli.LogWritten(options.save_model,
                  changed || suggested

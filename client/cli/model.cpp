@@ -212,6 +212,7 @@ void AddModel(Cli* cli) {
   diff->add_option("BEFORE", options->model, "A model file, a name or a hash")->type_name("")->required();
   diff->add_option("AFTER", options->other, "Another")->type_name("")->required();
   cli->AddSourceOptions(diff);
+  AddModelPromote(cli, group);
 }
 
 }  // namespace touchstone::cli

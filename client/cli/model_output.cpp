@@ -13,9 +13,10 @@ std::string SurfaceMapPath(const std::string& model_path) {
 }
 
 absl::Status WriteModel(const Cli& cli, const std::string& option, const std::string& path,
-                        const model::Model& model) {
+                        const model::Model& model, const model::Provenance& provenance) {
+  const std::string from = model::FormatProvenance(provenance);
   const std::string map_path = SurfaceMapPath(path);
-  if (map_path.empty()) return cli.Write(path, model::FormatModel(model));
+  if (map_path.empty()) return cli.Write(path, model::FormatModel(model) + from);
   model::Model written = model;
   for (model::EffectInstance& instance : written.effects) {
     if (instance.effect->surface_map == nullptr) continue;
@@ -28,7 +29,7 @@ absl::Status WriteModel(const Cli& cli, const std::string& option, const std::st
     effect->surface_map = std::make_shared<const model::SurfaceMapSpec>(std::move(spec));
     instance.effect = std::move(effect);
   }
-  return cli.Write(path, model::FormatModel(written, model::FileContent::kBeside));
+  return cli.Write(path, model::FormatModel(written, model::FileContent::kBeside) + from);
 }
 
 }  // namespace touchstone::cli

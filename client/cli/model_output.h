@@ -6,6 +6,7 @@
 
 #include "client/cli/common.h"
 #include "server/model/model.h"
+#include "server/model/provenance.h"
 
 namespace touchstone::cli {
 
@@ -14,6 +15,6 @@ std::string SurfaceMapPath(const std::string& model_path);
 
 // Writes a model; one with a surface map to standard output holds the map within. Says which map it wrote.
 absl::Status WriteModel(const Cli& cli, const std::string& option, const std::string& path,
-                        const model::Model& model);
+                        const model::Model& model, const model::Provenance& provenance = {});
 
 }  // namespace touchstone::cli

@@ -13,6 +13,7 @@
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
+#include "server/model/provenance.h"
 #include "server/model/surface_map_file.h"
 #include "server/model/yaml_tree.h"
 
@@ -30,7 +31,7 @@ class ModelReader {
     TOUCHSTONE_RETURN_IF_ERROR(
         Want(root, Kind::kMap, "a model file", "touchstone: model/1, name: ..., effects: ..."));
     TOUCHSTONE_RETURN_IF_ERROR(
-        CheckKeys(root, "a model file", {"touchstone", "name", "end_effector", "effects"}));
+        CheckKeys(root, "a model file", {"touchstone", "name", "end_effector", "effects", "provenance"}));
     const YamlNode* format = root.Find("touchstone");
     if (format == nullptr)
       return Error(root, "the first line 'touchstone: model/1' is missing: is this a model file?");
@@ -46,6 +47,9 @@ class ModelReader {
           Want(*effects, Kind::kSequence, "effects", "one '- effect: {parameter: value}' a line"));
       for (const YamlNode& item : effects->items) TOUCHSTONE_RETURN_IF_ERROR(ReadEffect(item));
     }
+    // It says nothing of the physics: whoever asks for it reads it (provenance.h).
+    if (const YamlNode* provenance = root.Find("provenance"); provenance != nullptr)
+      TOUCHSTONE_RETURN_IF_ERROR(ProvenanceOf(*provenance, origin_).status());
     return std::move(model_);
   }
 

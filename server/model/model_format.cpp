@@ -13,35 +13,10 @@
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
 #include "server/model/user_term_fields.h"
+#include "server/model/yaml_text.h"
 
 namespace touchstone::model {
 namespace {
-
-// In double quotes, with what YAML would take apart escaped.
-std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const unsigned char c : text) {
-    if (c == '"' || c == '\\')
-      absl::StrAppend(&quoted, "\\", std::string(1, c));
-    else if (c < 0x20 || c == 0x7F)
-      absl::StrAppendFormat(&quoted, "\\x%02x", c);
-    else
-      quoted.push_back(c);
-  }
-  return quoted + "\"";
-}
-
-// Without quotes where no reader could take the text for anything but a text.
-std::string Scalar(const std::string& text) {
-  const std::string lower = absl::AsciiStrToLower(text);
-  const bool word = !text.empty() && absl::ascii_isalpha(text[0]) &&
-                    std::all_of(text.begin(), text.end(), [](unsigned char c) {
-                      return absl::ascii_isalnum(c) || c == '_' || c == '-' || c == '.';
-                    });
-  const bool special = lower == "null" || lower == "true" || lower == "false" || lower == "yes" ||
-                       lower == "no" || lower == "on" || lower == "off" || lower == "y" || lower == "n";
-  return word && !special ? text : Quoted(text);
-}
 
 // "radius_mm: 1.5", one per parameter.
 std::vector<std::string> Entries(const Effect& effect, const std::vector<double>& values, int fingers) {
@@ -59,14 +34,14 @@ void AppendObjects(const EffectInstance& instance, int fingers, std::string* tex
   if (instance.object_values.empty()) return;
   absl::StrAppend(text, "      objects:\n");
   for (const auto& [object, values] : instance.object_values)
-    absl::StrAppend(text, "        ", Scalar(object), ": {",
+    absl::StrAppend(text, "        ", YamlText(object), ": {",
                     absl::StrJoin(Entries(*instance.effect, values, fingers), ", "), "}\n");
 }
 
 void AppendFormula(const EffectInstance& instance, int fingers, std::string* text) {
   const Effect& effect = *instance.effect;
   const FormulaSpec& spec = *effect.formula;
-  absl::StrAppend(text, "  - formula:\n      name: ", Scalar(spec.name), "\n");
+  absl::StrAppend(text, "  - formula:\n      name: ", YamlText(spec.name), "\n");
   if (instance.per_object) absl::StrAppend(text, "      scope: object\n");
   absl::StrAppend(text, "      adds: ", AddsName(spec), "\n");
   if (spec.stage != DefaultStage(spec)) absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
@@ -89,10 +64,10 @@ std::string NumberList(const std::vector<double>& numbers) {
 }
 
 void AppendLookup(const LookupSpec& spec, std::string* text) {
-  absl::StrAppend(text, "  - lookup:\n      name: ", Scalar(spec.name), "\n      adds: ", AddsName(spec),
+  absl::StrAppend(text, "  - lookup:\n      name: ", YamlText(spec.name), "\n      adds: ", AddsName(spec),
                   "\n");
   if (spec.stage != DefaultStage(spec)) absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
-  absl::StrAppend(text, "      covariate: ", Scalar(spec.covariate),
+  absl::StrAppend(text, "      covariate: ", YamlText(spec.covariate),
                   "\n      knots: ", NumberList(spec.knots), "\n");
   if (spec.values.size() == 1) {
     absl::StrAppend(text, "      values: ", NumberList(spec.values[0]), "\n");
@@ -101,15 +76,16 @@ void AppendLookup(const LookupSpec& spec, std::string* text) {
   absl::StrAppend(text, "      values:\n");
   const int fingers = static_cast<int>(spec.values.size());
   for (int i = 0; i < fingers; ++i)
-    absl::StrAppend(text, "        ", Scalar(FingerName(i, fingers)), ": ", NumberList(spec.values[i]), "\n");
+    absl::StrAppend(text, "        ", YamlText(FingerName(i, fingers)), ": ", NumberList(spec.values[i]),
+                    "\n");
 }
 
 void AppendSurfaceMap(const SurfaceMapSpec& spec, FileContent content, std::string* text) {
   if (content == FileContent::kBeside) {
-    absl::StrAppend(text, "  - surface_map: {file: ", Scalar(spec.file), "}\n");
+    absl::StrAppend(text, "  - surface_map: {file: ", YamlText(spec.file), "}\n");
     return;
   }
-  absl::StrAppend(text, "  - surface_map:\n      file: ", Scalar(spec.file), "\n      csv: |\n");
+  absl::StrAppend(text, "  - surface_map:\n      file: ", YamlText(spec.file), "\n      csv: |\n");
   for (const absl::string_view line : absl::StrSplit(FormatSurfaceMap(spec.objects), '\n', absl::SkipEmpty()))
     absl::StrAppend(text, "        ", line, "\n");
 }
@@ -117,7 +93,7 @@ void AppendSurfaceMap(const SurfaceMapSpec& spec, FileContent content, std::stri
 }  // namespace
 
 std::string FormatModel(const Model& model, FileContent content) {
-  std::string text = absl::StrCat("touchstone: model/1\nname: ", Scalar(model.name),
+  std::string text = absl::StrCat("touchstone: model/1\nname: ", YamlText(model.name),
                                   "\nend_effector: {fingers: ", model.fingers,
                                   ", spacing_mm: ", FileNumber(Unit::kMillimetre, model.spacing_m), "}\n",
                                   model.effects.empty() ? "effects: []\n" : "effects:\n");
