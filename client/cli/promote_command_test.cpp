@@ -23,7 +23,9 @@ class PromoteCommandTest : public RealBinaryTest {
     Write("rig.yaml", model);
     Write("real.yaml", model + "  - tip_radius: {radius_mm: 2}\n");
     Write("wrong.yaml", model + "  - speed_error: {relative: 0.05}\n");
-    Write("same.yaml", model + "  - tip_radius: {radius_mm: 0.0001}\n");
+    Write(
+        "same.yaml",
+        "touchstone: model/1\nname: other\neffects:\n  - gaussian_noise: {sigma_us: 5000}\n");  // noise moves no error
     const auto make = [&](const std::string& file, const std::string& seed) {
       ASSERT_EQ(
           Run({"touch", "--plan", "plan.csv", "--model", "real.yaml", "--seed", seed, "-o", file}).exit_code,

@@ -45,7 +45,7 @@ void AppendFormula(const EffectInstance& instance, int fingers, std::string* tex
   if (instance.per_object) absl::StrAppend(text, "      scope: object\n");
   absl::StrAppend(text, "      adds: ", AddsName(spec), "\n");
   if (spec.stage != DefaultStage(spec)) absl::StrAppend(text, "      stage: ", StageName(spec.stage), "\n");
-  absl::StrAppend(text, "      expression: ", Quoted(spec.expression), "\n");
+  absl::StrAppend(text, "      expression: ", QuotedYamlText(spec.expression), "\n");
   if (!effect.parameters.empty()) absl::StrAppend(text, "      parameters:\n");
   for (size_t i = 0; i < effect.parameters.size(); ++i) {
     const ParameterInfo& parameter = effect.parameters[i];

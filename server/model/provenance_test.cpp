@@ -7,6 +7,21 @@
 namespace touchstone::model {
 namespace {
 
+class NoEffects : public EffectCatalogue {
+ public:
+  std::vector<std::shared_ptr<const Effect>> All() const override { return {}; }
+  std::shared_ptr<const Effect> Find(const std::string&) const override { return nullptr; }
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeFormula(const FormulaSpec&) const override {
+    return absl::UnimplementedError("no formula is read here");
+  }
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeLookup(const LookupSpec&) const override {
+    return absl::UnimplementedError("no lookup is read here");
+  }
+  absl::StatusOr<std::shared_ptr<const Effect>> MakeSurfaceMap(const SurfaceMapSpec&) const override {
+    return absl::UnimplementedError("no map is read here");
+  }
+};
+
 Provenance Promoted() {
   Provenance provenance;
   provenance.over_name = "nominal", provenance.over_hash = "12ab";
@@ -42,7 +57,7 @@ TEST(Provenance, IsReadBackAsItWasWritten) {
 
 // It describes the model, and is no part of its physics.
 TEST(Provenance, ChangesNeitherHashNorModel) {
-  EffectCatalogue none;
+  const NoEffects none;
   const absl::StatusOr<Model> model = ParseModel(FileOf(Promoted()), "better.yaml", none);
   ASSERT_TRUE(model.ok()) << model.status();
   EXPECT_EQ(model->Hash(), NominalModel().Hash());
@@ -58,7 +73,7 @@ TEST(Provenance, OfAFileWithoutItIsEmpty) {
 
 TEST(Provenance, MistakesAreNamedWithTheirPlace) {
   const auto message = [](const std::string& text) {
-    EffectCatalogue none;
+    const NoEffects none;
     const absl::Status status = ParseModel(FormatModel(NominalModel()) + text, "better.yaml", none).status();
     EXPECT_FALSE(status.ok()) << text;
     return std::string(status.message());

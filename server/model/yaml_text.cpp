@@ -7,9 +7,8 @@
 #include <algorithm>
 
 namespace touchstone::model {
-namespace {
 
-std::string Quoted(const std::string& text) {
+std::string QuotedYamlText(const std::string& text) {
   std::string quoted = "\"";
   for (const unsigned char c : text) {
     if (c == '"' || c == '\\')
@@ -22,8 +21,6 @@ std::string Quoted(const std::string& text) {
   return quoted + "\"";
 }
 
-}  // namespace
-
 std::string YamlText(const std::string& text) {
   const std::string lower = absl::AsciiStrToLower(text);
   const bool word = !text.empty() && absl::ascii_isalpha(text[0]) &&
@@ -32,7 +29,7 @@ std::string YamlText(const std::string& text) {
                     });
   const bool special = lower == "null" || lower == "true" || lower == "false" || lower == "yes" ||
                        lower == "no" || lower == "on" || lower == "off" || lower == "y" || lower == "n";
-  return word && !special ? text : Quoted(text);
+  return word && !special ? text : QuotedYamlText(text);
 }
 
 }  // namespace touchstone::model
