@@ -146,7 +146,10 @@ def between(nominal: str, better: str, added: Sequence[str] | None = None) -> li
 
 def _blocks(model: str) -> tuple[str, list[str]]:
     """A model file up to its effects, and each effect with the lines that belong to it."""
-    head, _, effects = model.partition("\neffects:")
+    head, _, rest = model.partition("\neffects:")
+    effects, said, _ = rest.partition("\nprovenance:")  # what the model was fitted to is no effect
+    if said:
+        effects += "\n"
     blocks: list[str] = []
     for line in effects.splitlines(keepends=True):
         if line.startswith("  - "):
