@@ -226,6 +226,8 @@ def test_steps_stand_in_the_order_of_the_better_models_file():
     only_values = ladder.between(nominal, nominal.replace("radius_mm: 1", "radius_mm: 3"))
     assert [name for name, _ in only_values] == ["nominal", "+ refitted values"]
     assert len(ladder.between(nominal, nominal.replace("name: nominal", "name: other"))) == 1
+    saved = better + "provenance:\n  fitted_to:\n    - {set: set.csv}\n"  # what the model was fitted to is no effect
+    assert ladder.between(nominal, saved) == list(zip(names, models))
     assert ladder.between("touchstone: model/1\nname: a\neffects: []\n", "touchstone: model/1\nname: a\neffects:\n" + TILT)[-1][0] == "+ tool_tilt"
 
 
