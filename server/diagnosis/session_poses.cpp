@@ -13,7 +13,7 @@ constexpr size_t kMaxSessionPairs = 8;  // as many as a person reads
 
 // What one model leaves of a session.
 struct LeftBy {
-  std::unique_ptr<selection::Workspace> workspace;
+  std::shared_ptr<const selection::Workspace> workspace;
   std::vector<double> residuals_s;
 };
 
@@ -42,7 +42,10 @@ absl::StatusOr<std::vector<report::Sessions::Pair>> CompareSharedPoses(
     LeftBy measured, left;
     if (one.noise_floor && one.noise_floor->sigma > 0) {
       TOUCHSTONE_ASSIGN_OR_RETURN(measured, WhatIsLeft(one.input, one.input.model, context));
-      TOUCHSTONE_ASSIGN_OR_RETURN(left, WhatIsLeft(one.input, one.own, context));
+      left = measured;
+      if (one.own != one.input.model) {
+        TOUCHSTONE_ASSIGN_OR_RETURN(left, WhatIsLeft(one.input, one.own, context));
+      }
     }
     if (measured.workspace != nullptr && measured_before.workspace != nullptr) {
       const report::NoiseFloor& floor_before = *sessions[s - 1].noise_floor;

@@ -77,7 +77,7 @@ class SessionsReporter {
     if (diagnosis_.verdict == Verdict::kCheckData) return MistakenAfterAll();
     AddSteps();
     TOUCHSTONE_RETURN_IF_ERROR(CompareSamePoses());
-    Judge();
+    AssessAll();
     Summarize();
     return std::move(diagnosis_);
   }
@@ -337,7 +337,7 @@ class SessionsReporter {
   }
 
   // What all sessions together say.
-  void Judge() {
+  void AssessAll() {
     if (!changes().steps.empty())
       diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kMissingEffects);
     else if (changes().moved())

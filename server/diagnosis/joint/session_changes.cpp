@@ -186,7 +186,7 @@ class ChangeFinder {
       open.erase(open.begin() + static_cast<long>(best));
       SessionStep step;
       step.effect = in_place.back().name();
-      Judge(&step);
+      AssessStep(&step);
       DescribeLast(in_place.back(), whole, &step.parameters);
       if (open.empty()) {
         step.models = found_.models;
@@ -209,7 +209,7 @@ class ChangeFinder {
     return states;
   }
 
-  void Judge(SessionStep* step) const {
+  void AssessStep(SessionStep* step) const {
     SessionStates without = choice_->states();
     for (int g = 0; g < groups(); ++g)
       if (group(g).effect == step->effect) without[g] = SessionValues::kGiven;

@@ -13,7 +13,7 @@
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr int kStretches[] = {8, 24};  // of a session, in which errors may wander
+constexpr int kStretches[] = {8, 24};  // of a session, in which errors may drift
 constexpr double kChance = 1e-3;       // of blocks that scatter so much by chance, over all that is tried
 constexpr double kMovedShare =
     1e-3;  // of a column's largest entry: a row that moves so little does not count as moved

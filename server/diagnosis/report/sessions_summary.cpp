@@ -11,7 +11,7 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-constexpr double kLeastP = 1e-300;
+constexpr double kMinP = 1e-300;
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
   return absl::StrCat(effect.effect, " ", value.name,
@@ -31,7 +31,7 @@ std::string ChangedInWords(const Sessions& sessions, const std::vector<DataRepor
         to.std_error, to.unit, SessionName(data, sessions.taking_part[value.to])));
   }
   std::string words = absl::StrFormat("Changed: %s (by chance with p = %.1g).", absl::StrJoin(changes, "; "),
-                                      std::max(effect.p, kLeastP));
+                                      std::max(effect.p, kMinP));
   if (!effect.equivalent.empty())
     absl::StrAppend(&words, " A change of ", absl::StrJoin(effect.equivalent, " or "),
                     " would explain the sessions as well.");
@@ -90,7 +90,7 @@ std::string SessionsInWords(const Sessions& sessions, const std::vector<DataRepo
         "where noise lets expect %.3g ms (p = %.1g)%s",
         shown.poses, SessionName(data, pair.from), SessionName(data, pair.to),
         modelled ? "less what each session's model expects " : "", shown.rms_s * 1e3, shown.expected_s * 1e3,
-        std::max(shown.p, kLeastP),
+        std::max(shown.p, kMinP),
         shown.p >= kSamePosesP ? "."
         : sessions.changes     ? ": something changed that no value of the model describes."
                                : ": the sessions differ, whatever the model."));
