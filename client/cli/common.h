@@ -207,6 +207,7 @@ void AddDiagnose(Cli* cli);
 void AddCheck(Cli* cli);
 void AddRehearse(Cli* cli);
 void AddExplain(Cli* cli);
+void AddUncertainty(Cli* cli);
 void AddHistory(Cli* cli);
 void AddModelPromote(Cli* cli, CLI::App* group);
 void AddPropose(Cli* cli);

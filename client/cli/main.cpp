@@ -26,6 +26,7 @@ void AddCommands(Cli* cli) {
   AddCompare(cli);
   AddDiagnose(cli);
   AddExplain(cli);
+  AddUncertainty(cli);
   AddHistory(cli);
   AddCheck(cli);
   AddRehearse(cli);

@@ -95,6 +95,11 @@ std::vector<OutputCase> Cases() {
        {"set.csv"},
        false},
       {"ExplainAsJson", {"explain", "tip_radius", "set.csv", "--json", "OUT"}, ".json", {"set.csv"}, false},
+      {"UncertaintyAsJson",
+       {"uncertainty", "report.json", "set.csv", "--json", "OUT"},
+       ".json",
+       {"report.json", "set.csv"},
+       false},
       {"ModelPromote",
        {"model", "promote", "tips.yaml", "--over", "./model.yaml", "--on", "set.csv", "-o", "OUT"},
        ".yaml",
@@ -158,7 +163,8 @@ class OutputCommandTest : public RealBinaryTest, public ::testing::WithParamInte
   std::map<std::string, std::string> MakeInputs() {
     Write("map.csv",
           "object,x_mm,y_mm,z_mm,departure_mm,std_dev_mm,length_mm,rms_mm\nmine,50,0,0,0.1,0.02,22,0.3\n");
-    Write("also.yaml", "not read before the outputs are checked");
+    for (const char* name : {"also.yaml", "report.json"})
+      Write(name, "not read before the outputs are checked");
     const std::vector<std::vector<std::string>> commands = {
         {"model", "new", "-o", "model.yaml"},
         {"model", "add", "model.yaml", "tip_radius", "radius_mm=3", "-o", "tips.yaml"},
@@ -168,8 +174,8 @@ class OutputCommandTest : public RealBinaryTest, public ::testing::WithParamInte
         {"session", "import", "set.csv", "-o", "session.db"}};
     for (const std::vector<std::string>& command : commands) EXPECT_EQ(Run(command).exit_code, 0);
     std::map<std::string, std::string> files;
-    for (const char* name : {"map.csv", "also.yaml", "model.yaml", "tips.yaml", "mine.off", "plan.csv",
-                             "set.csv", "session.db"}) {
+    for (const char* name : {"map.csv", "also.yaml", "report.json", "model.yaml", "tips.yaml", "mine.off",
+                             "plan.csv", "set.csv", "session.db"}) {
       files[name] = Read(name);
       fs::remove(Path(name));
     }

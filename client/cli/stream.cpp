@@ -11,6 +11,7 @@
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/report_posterior.h"
 #include "client/cli/slurm.h"
 #include "client/source/dataset_folder.h"
 #include "client/source/dataset_writer.h"
@@ -28,6 +29,7 @@ struct StreamOptions {
   std::vector<std::string> objects;
   std::vector<std::string> columns;
   std::string model;
+  std::string uncertainty, models_from;  // reports
   std::optional<uint64_t> samples;
   uint64_t seed = 0;
   uint32_t max_draws = 1000;
@@ -42,6 +44,7 @@ struct StreamOptions {
 };
 
 constexpr uint64_t kDefaultSamples = 1000;
+constexpr char kUncertaintyColumn[] = "std_uncertainty";
 
 // The objects of the source, for "all".
 absl::StatusOr<std::vector<std::string>> AllObjects(client::Connection* connection) {
@@ -54,6 +57,24 @@ absl::StatusOr<std::vector<std::string>> AllObjects(client::Connection* connecti
 
 bool Contains(const google::protobuf::RepeatedPtrField<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// What the report of a diagnosis adds: uncertainties, or models that are drawn.
+absl::Status AddPosterior(const Cli& cli, const StreamOptions& o, v1::DatasetSpec* spec) {
+  if (o.uncertainty.empty() && o.models_from.empty()) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ReportedPosterior reported,
+                              PosteriorOfReport(o.models_from.empty() ? o.uncertainty : o.models_from));
+  if (!reported.note.empty()) cli.Log(reported.note);
+  *spec->mutable_posterior() = reported.posterior;
+  spec->set_draw_models(!o.models_from.empty());
+  if (o.uncertainty.empty()) return absl::OkStatus();
+  if (!Contains(spec->columns(), kUncertaintyColumn)) spec->add_columns(kUncertaintyColumn);
+  if (o.models_from.empty() || o.models_from == o.uncertainty) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const ReportedPosterior other, PosteriorOfReport(o.uncertainty));
+  if (other.posterior.SerializeAsString() == spec->posterior().SerializeAsString()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("--uncertainty: ", o.uncertainty,
+                                                 " is another report than that of --models-from, ",
+                                                 o.models_from, "; a dataset has one"));
 }
 
 absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o, client::ShardFormat format,
@@ -86,12 +107,13 @@ absl::StatusOr<v1::DatasetSpec> MakeSpec(const Cli& cli, const StreamOptions& o,
 
   if (columns.empty()) columns = {"index", "object", "pose", "descriptor"};
   for (const std::string& column : columns) {
-    TOUCHSTONE_RETURN_IF_ERROR(
-        OneOf("--columns", column,
-              {"index", "object", "descriptor", "contact_time", "pose", "contact", "image"})
-            .status());
+    TOUCHSTONE_RETURN_IF_ERROR(OneOf("--columns", column,
+                                     {"index", "object", "descriptor", "contact_time", "pose", "contact",
+                                      "image", kUncertaintyColumn, "model_values"})
+                                   .status());
     if (!Contains(spec.columns(), column)) spec.add_columns(column);
   }
+  TOUCHSTONE_RETURN_IF_ERROR(AddPosterior(cli, o, &spec));
   if (any_image_option && !Contains(spec.columns(), "image")) spec.add_columns("image");
   // A folder's table is a measurement file, which has these.
   if (format == client::ShardFormat::kFolder) {
@@ -255,6 +277,8 @@ void AddStream(Cli* cli) {
       "one of four jobs\n"
       "touchstone stream --samples 1000000 --out data --slurm --slurm-option=--time=60          "
       "by a Slurm cluster\n"
+      "touchstone stream --models-from report.json --samples 100000 --out data                 "
+      "each by a model of its own\n"
       "touchstone stream --like data/dataset.json --out again                                  "
       "the same once more",
       [cli, options, shard_size] { return RunStream(*cli, *options, (*shard_size)->count() > 0); });
@@ -275,10 +299,21 @@ void AddStream(Cli* cli) {
       add("--model", options->model, "MODEL", "Model file, name or hash. Default: the source's own", what));
   cli->AddInput(command, specification.back());
   specification.push_back(add("--columns", options->columns, "A,B,...",
-                              "Of index, object, descriptor, contact_time, pose, contact, image. "
+                              "Of index, object, descriptor, contact_time, pose, contact, image; with "
+                              "--models-from also model_values, each sample's own. "
                               "Default: index,object,pose,descriptor, and image with any image option",
                               what));
   specification.back()->take_all()->expected(1);
+  const auto add_report = [&](const std::string& name, std::string& path, const std::string& text) {
+    specification.push_back(add(name, path, "REPORT", text, what));
+    cli->AddInput(command, specification.back());
+  };
+  add_report("--uncertainty", options->uncertainty,
+             "Report of the diagnosis that found the model (diagnose --json): adds the columns "
+             "std_uncertainty_us of every contact "
+             "time, less the mean over its touch, and beyond_measured");
+  add_report("--models-from", options->models_from,
+             "The same report: every sample has a model of its own, drawn from what the report leaves open");
   specification.push_back(
       add("--max-draws", options->max_draws, "N",
           "A touch that misses is drawn again this often before the stream fails. Default: 1000", what));

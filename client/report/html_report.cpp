@@ -2,6 +2,8 @@
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
+#include <cmath>
+
 #include "client/report/joint.h"
 #include "client/report/next_commands.h"
 #include "client/report/report.h"
@@ -33,13 +35,28 @@ json LadderJson(const v1::Report& report) {
   return rungs;
 }
 
+// By object, x y z and the standard uncertainty of the improved model's contact time of every contact in
+// turn: for the picture on the object.
+json UncertaintyJson(const v1::DataReport& data) {
+  json objects = json::object();
+  const auto rounded = [](double value) { return std::round(1000 * value) / 1000; };
+  for (const v1::SurfacePoint& point : data.surface_points()) {
+    if (!(point.std_uncertainty() > 0)) continue;
+    json& list = objects[point.object()];
+    for (const double value : {point.x_mm(), point.y_mm(), point.z_mm(), point.std_uncertainty()})
+      list.push_back(rounded(value));
+  }
+  return objects;
+}
+
 json DataJson(const v1::DataReport& data) {
   const Floor floor = NoiseFloorOf(data);
   return {{"kind_name", KindName(data.kind())},
           {"floor", floor.sigma},
           {"floor_is_bound", floor.bound},
           {"finger_bias", FingerBiasWords(data)},
-          {"nearest_effect", NearestEffectWords(data.unexplained())}};
+          {"nearest_effect", NearestEffectWords(data.unexplained())},
+          {"uncertainty", UncertaintyJson(data)}};
 }
 
 // Sentences, names and commands that need the rules of words.h; the page writes numbers itself.
@@ -79,6 +96,7 @@ json PageWords(const v1::Report& report) {
 
 absl::StatusOr<std::string> PageData(const v1::Report& report) {
   v1::Report shown = report;
+  shown.clear_posterior();  // of programs that draw from it
   // The table of touches says what these two do, and to which touch they belong.
   for (v1::DataReport& data : *shown.mutable_data())
     if (data.has_touch_table()) data.clear_parity(), data.clear_surface_points();

@@ -88,6 +88,16 @@ TEST(PageData, HasTheTableOfTouchesAndTheJsonReportDoesNot) {
   EXPECT_FALSE(json_report["data"][0]["surface_points"].empty());
 }
 
+TEST(PageData, HasTheUncertaintyAtEveryContactByObject) {
+  v1::Report report = MissingEffectsReport();
+  EXPECT_TRUE(DataOfPage(report)["words"]["of_data"][0]["uncertainty"].empty());
+  v1::SurfacePoint* point = report.mutable_data(0)->add_surface_points();
+  point->set_object("cup");
+  point->set_y_mm(-20.25);
+  point->set_std_uncertainty(4100);
+  EXPECT_EQ(DataOfPage(report)["words"]["of_data"][0]["uncertainty"]["cup"], json({0, -20.25, 0, 4100}));
+}
+
 TEST(PageData, OfAnEmptyReportSaysThatNothingWasCompared) {
   EXPECT_EQ(DataOfPage(v1::Report())["words"]["headline"], "Nothing could be compared.");
 }

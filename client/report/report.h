@@ -22,6 +22,9 @@ std::string TerminalHistory(const v1::Report& report, int width, bool colour);
 // The same of an explanation: why (not) one effect.
 std::string TerminalExplanation(const v1::Report& report, int width, bool colour);
 
+// The same of how well a model predicts touches.
+std::string TerminalUncertainty(const v1::Report& report, int width, bool colour);
+
 // One HTML file that opens offline: client/workbench's page with the report's data inside; nothing is fetched. An error where
 // this build has no page.
 absl::StatusOr<std::string> HtmlReport(const v1::Report& report);

@@ -93,19 +93,41 @@ v1::RendererKind RendererOfName(const std::string& name) {
   return name == "cpu" ? v1::RENDERER_KIND_CPU : v1::RENDERER_KIND_UNSPECIFIED;
 }
 
+namespace {
+
+google::protobuf::util::JsonPrintOptions OurNames() {
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  return options;
+}
+
+}  // namespace
+
 Json SpecToJson(const v1::DatasetSpec& spec) {
   v1::DatasetSpec bare = spec;
   bare.clear_model();
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
+  bare.clear_posterior();
+  google::protobuf::util::JsonPrintOptions options = OurNames();
   options.always_print_primitive_fields = true;
   std::string text;
   const auto status = google::protobuf::util::MessageToJsonString(bare, &text, options);
   Json json = status.ok() ? ToLabUnits(Json::parse(text)) : Json::object();
   Unquote(&json, "seed");
   Unquote(&json, "samples");
+  if (!spec.draw_models()) json.erase("draw_models");
   return json;
 }
+
+namespace {
+
+// In the units of files as it stands: as reports have it.
+Json PosteriorToJson(const v1::ModelPosterior& posterior) {
+  std::string text;
+  const auto status = google::protobuf::util::MessageToJsonString(posterior, &text, OurNames());
+  return status.ok() ? Json::parse(text) : Json::object();
+}
+
+}  // namespace
 
 Json MakeIdentity(const v1::DatasetSpec& spec, const v1::DatasetHeader& header, const DatasetLayout& layout) {
   Json identity;
@@ -119,6 +141,7 @@ Json MakeIdentity(const v1::DatasetSpec& spec, const v1::DatasetHeader& header, 
                        {"fingers", header.fingers()},
                        {"spacing_mm", LabNumber(Unit::kMillimetre, header.spacing_m())},
                        {"yaml", header.model_yaml()}};
+  if (spec.has_posterior()) identity["posterior"] = PosteriorToJson(spec.posterior());
   identity["objects"] = Json::array();
   for (int i = 0; i < spec.objects_size(); ++i)
     identity["objects"].push_back(
@@ -152,6 +175,13 @@ absl::StatusOr<v1::DatasetSpec> SpecOf(const Json& manifest, const std::string& 
         absl::StrCat(origin, ": 'specification' cannot be read: ", std::string(status.message())));
   const std::string yaml = manifest["model"].value("yaml", "");
   if (!yaml.empty()) spec.mutable_model()->set_yaml(yaml);
+  if (manifest.contains("posterior")) {
+    const auto read = google::protobuf::util::JsonStringToMessage(manifest["posterior"].dump(),
+                                                                  spec.mutable_posterior(), options);
+    if (!read.ok())
+      return absl::InvalidArgumentError(
+          absl::StrCat(origin, ": 'posterior' cannot be read: ", std::string(read.message())));
+  }
   if (manifest.contains("renderer"))
     spec.mutable_image()->set_renderer(RendererOfName(manifest["renderer"].get<std::string>()));
   return spec;

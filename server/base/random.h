@@ -19,6 +19,7 @@ enum class RandomDomain : uint64_t {
   kImage = 7,
   kDiagnosis = 8,
   kNoiseMemory = 9,  // the wander of a finger in session time
+  kModelDraw = 10,   // the model of sample `index`, where a posterior has many
   kTest = 1000,
 };
 

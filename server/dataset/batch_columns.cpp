@@ -65,6 +65,29 @@ void PutSpeed(const Writer& writer, const TouchSampler::Block& block) {
   });
 }
 
+void PutStdUncertainty(const Writer& writer, const TouchSampler::Block& block) {
+  const int fingers = block.batch.fingers();
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    for (int finger = 0; finger < fingers; ++finger)
+      writer.Put(slot, finger, static_cast<float>(block.uncertainty->combined_s[touch * fingers + finger]));
+  });
+}
+
+void PutBeyondMeasured(const Writer& writer, const TouchSampler::Block& block) {
+  const int fingers = block.batch.fingers();
+  ForAccepted(block, [&](int touch, uint32_t slot) {
+    for (int finger = 0; finger < fingers; ++finger)
+      writer.Put(slot, finger, block.uncertainty->beyond_measured[touch * fingers + finger]);
+  });
+}
+
+void PutModelValues(const Writer& writer, const TouchSampler::Block& block) {
+  ForAccepted(block, [&](int, uint32_t slot) {
+    for (size_t k = 0; k < block.model_values.size(); ++k)
+      writer.Put(slot, k, static_cast<float>(block.model_values[k]));
+  });
+}
+
 struct NamedPut {
   const char* name;
   BatchColumns::PutColumn put;
@@ -79,6 +102,9 @@ constexpr NamedPut kTouchColumns[] = {
     {"speed_m_s", PutSpeed},
     {"contact_point_m", PutFingerVectors<&effects::TouchBatch::contact_m>},
     {"normal", PutFingerVectors<&effects::TouchBatch::normal>},
+    {"std_uncertainty_s", PutStdUncertainty},
+    {"beyond_measured", PutBeyondMeasured},
+    {"model_values", PutModelValues},
 };
 
 }  // namespace

@@ -35,7 +35,6 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
                                     absl::Span<const touch::TouchPose> poses,
                                     const std::atomic<bool>& cancelled) const {
   const DatasetImage& image = specification_->image;
-  const bool photographs = image::ChangesPhotographs(*specification_->model);
   image::PhotoWorkspace workspace;
   size_t slot = 0;
   for (DatasetBatch& batch : batches) {
@@ -49,10 +48,12 @@ absl::Status BatchMaker::MakeImages(absl::Span<DatasetBatch> batches, const Batc
       const uint64_t index = batch.IndexOf(row);
       const auto& object = specification_->objects[index % specification_->objects.size()];
       const image::PhotoNumber number{specification_->seed, index};
-      TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture,
-                                  photographs ? image::TakePhotograph(specification_->model, object, camera,
-                                                                      image.options, number, &workspace)
-                                              : image.renderer->Render(object, camera, image.options));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::shared_ptr<const model::Model> model, sampler_.ModelOf(index));
+      const bool photographs = image::ChangesPhotographs(*model);
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          const image::Image picture,
+          photographs ? image::TakePhotograph(model, object, camera, image.options, number, &workspace)
+                      : image.renderer->Render(object, camera, image.options));
       TOUCHSTONE_RETURN_IF_ERROR(columns.AppendPicture(picture, image, &batch));
     }
   }

@@ -23,6 +23,8 @@ constexpr ColumnName kColumnNames[] = {
     {"pose", &ColumnChoice::pose},
     {"contact", &ColumnChoice::contact},
     {"image", &ColumnChoice::image},
+    {"std_uncertainty", &ColumnChoice::std_uncertainty},
+    {"model_values", &ColumnChoice::model_values},
 };
 
 absl::Status ValidateImage(const DatasetImage& image, ImageOrigin origin) {
@@ -81,6 +83,37 @@ absl::Status CheckMaxDraws(uint32_t max_draws) {
   return absl::InvalidArgumentError(absl::StrCat("max_draws = ", max_draws, ": must be from 1 to 1000000"));
 }
 
+namespace {
+
+// Before anything is drawn from it.
+absl::Status CheckPosteriorOf(const DatasetSpecification& specification) {
+  if (specification.posterior == nullptr) {
+    const char* field = specification.draw_models               ? "draw_models"
+                        : specification.columns.std_uncertainty ? "columns: 'std_uncertainty'"
+                        : specification.columns.model_values    ? "columns: 'model_values'"
+                                                                : nullptr;
+    if (field == nullptr) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrCat(
+        field,
+        " needs `posterior`, which a report of `touchstone diagnose --json` has: give the report "
+        "(touchstone stream --uncertainty REPORT)"));
+  }
+  if (specification.columns.model_values && !specification.draw_models)
+    return absl::InvalidArgumentError(
+        "columns: 'model_values' are those of models that are drawn: set draw_models too (touchstone stream "
+        "--models-from REPORT)");
+  TOUCHSTONE_RETURN_IF_ERROR(uncertainty::CheckPosterior(*specification.posterior));
+  const std::string own = specification.posterior->model.Hash();
+  if (specification.model != nullptr && specification.model->Hash() != own)
+    return absl::InvalidArgumentError(absl::StrCat(
+        "posterior: is that of model '", specification.posterior->model.name, "' (", own.substr(0, 8),
+        "), but '", specification.model->name, "' (", specification.model->Hash().substr(0, 8),
+        ") was asked for: leave the model out, or diagnose a set with that model"));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin images) {
   if (specification->objects.empty())
     return absl::InvalidArgumentError(
@@ -89,6 +122,7 @@ absl::Status ValidateDataset(DatasetSpecification* specification, ImageOrigin im
     return absl::InvalidArgumentError(
         absl::StrCat("objects has ", specification->objects.size(), " names: at most 10000"));
   TOUCHSTONE_RETURN_IF_ERROR(touch::ValidatePlan(&specification->plan));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckPosteriorOf(*specification));
   if (specification->columns.image) TOUCHSTONE_RETURN_IF_ERROR(ValidateImage(specification->image, images));
   if (specification->columns.image && images == ImageOrigin::kRendered && specification->model != nullptr)
     TOUCHSTONE_RETURN_IF_ERROR(
@@ -132,10 +166,16 @@ size_t ColumnInfo::BytesPerSample() const {
 }
 
 std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification) {
-  return ColumnsOf(specification.columns, specification.image, specification.model->fingers);
+  return ColumnsOf(specification.columns, specification.image, specification.model->fingers,
+                   OpenValuesOf(specification));
 }
 
-std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int finger_count) {
+int OpenValuesOf(const DatasetSpecification& specification) {
+  return specification.posterior == nullptr ? 0 : static_cast<int>(specification.posterior->values.size());
+}
+
+std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int finger_count,
+                                  int open_values) {
   const uint32_t fingers = finger_count;
   std::vector<ColumnInfo> columns;
   if (choice.index) columns.push_back({"index", ColumnType::kUint64, {}});
@@ -153,6 +193,12 @@ std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage
     columns.push_back({"contact_point_m", ColumnType::kFloat32, {fingers, 3}});
     columns.push_back({"normal", ColumnType::kFloat32, {fingers, 3}});
   }
+  if (choice.std_uncertainty) {
+    columns.push_back({"std_uncertainty_s", ColumnType::kFloat32, {fingers}});
+    columns.push_back({"beyond_measured", ColumnType::kUint8, {fingers}});
+  }
+  if (choice.model_values)
+    columns.push_back({"model_values", ColumnType::kFloat32, {static_cast<uint32_t>(open_values)}});
   if (choice.image) {
     const uint32_t width = image.options.width, height = image.options.height;
     const uint32_t channels = image.options.format == image::PixelFormat::kRgb ? 3 : 1;

@@ -13,6 +13,7 @@
 #include "server/image/renderer.h"
 #include "server/model/model.h"
 #include "server/touch/plan.h"
+#include "server/uncertainty/posterior.h"
 
 namespace touchstone::dataset {
 
@@ -35,9 +36,11 @@ struct ColumnChoice {
   bool object = false;
   bool descriptor = false;
   bool contact_time = false;
-  bool pose = false;     // target_m, approach, lateral, standoff_m, speed_m_s
-  bool contact = false;  // contact_point_m, normal
-  bool image = false;    // and depth_m, mask where the options ask for them
+  bool pose = false;             // target_m, approach, lateral, standoff_m, speed_m_s
+  bool contact = false;          // contact_point_m, normal
+  bool image = false;            // and depth_m, mask where the options ask for them
+  bool std_uncertainty = false;  // and beyond_measured
+  bool model_values = false;
 
   // Names as on the wire; an unknown name is an error that lists the known ones.
   static absl::StatusOr<ColumnChoice> FromNames(const std::vector<std::string>& names);
@@ -52,6 +55,9 @@ struct DatasetSpecification {
   ColumnChoice columns;
   DatasetImage image;
   uint32_t max_draws = 1000;  // for one index, before the stream fails
+  // What is open about the model; null: nothing is known of that.
+  std::shared_ptr<const uncertainty::Posterior> posterior;
+  bool draw_models = false;  // every sample has a model of its own, drawn from the posterior
 };
 
 // Where the images of a dataset come from.
@@ -85,7 +91,10 @@ struct ColumnInfo {
 };
 
 // The columns of every batch, in their order.
-std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int fingers);
+// `open_values`: of the posterior.
+std::vector<ColumnInfo> ColumnsOf(const ColumnChoice& choice, const DatasetImage& image, int fingers,
+                                  int open_values = 0);
 std::vector<ColumnInfo> ColumnsOf(const DatasetSpecification& specification);  // with the model's fingers
+int OpenValuesOf(const DatasetSpecification& specification);
 
 }  // namespace touchstone::dataset

@@ -7,6 +7,7 @@
 #include "server/diagnosis/plan_reports.h"
 #include "server/diagnosis/session_reports.h"
 #include "server/diagnosis/touch_reports.h"
+#include "server/diagnosis/uncertainty_reports.h"
 
 namespace touchstone::diagnosis {
 
@@ -50,6 +51,12 @@ absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const desig
 absl::StatusOr<report::Diagnosis> Explain(const DiagnosisInput& input, const std::string& effect,
                                           const DiagnosisContext& context) {
   return ExplainTouches(input, effect, context);
+}
+
+absl::StatusOr<report::Diagnosis> Uncertainty(const DiagnosisInput& input,
+                                              const uncertainty::Posterior& posterior,
+                                              const DiagnosisContext& context) {
+  return UncertaintyOfPlan(input, posterior, context);
 }
 
 }  // namespace touchstone::diagnosis

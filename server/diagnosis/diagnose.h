@@ -44,4 +44,10 @@ absl::StatusOr<report::Diagnosis> Check(const DiagnosisInput& input, const desig
 absl::StatusOr<report::Diagnosis> Explain(const DiagnosisInput& input, const std::string& effect,
                                           const DiagnosisContext& context);
 
+// How well a fitted model predicts the touches of a plan, whose times are not read, and whose model is the
+// posterior's: Diagnosis::uncertainty, and data[0].surface_points. The verdict is kNone.
+absl::StatusOr<report::Diagnosis> Uncertainty(const DiagnosisInput& input,
+                                              const uncertainty::Posterior& posterior,
+                                              const DiagnosisContext& context);
+
 }  // namespace touchstone::diagnosis

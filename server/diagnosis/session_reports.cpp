@@ -16,7 +16,9 @@
 #include "server/diagnosis/report/summary.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/session_poses.h"
+#include "server/diagnosis/session_posterior.h"
 #include "server/diagnosis/touch_reports.h"
+#include "server/diagnosis/uncertainty_reports.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {
@@ -78,6 +80,7 @@ class SessionsReporter {
     AddSteps();
     TOUCHSTONE_RETURN_IF_ERROR(CompareSamePoses());
     AssessAll();
+    TOUCHSTONE_RETURN_IF_ERROR(AddReproducibility());
     Summarize();
     return std::move(diagnosis_);
   }
@@ -239,6 +242,11 @@ class SessionsReporter {
     if (rest == Verdict::kUnexplained) unexplained_.push_back(s);
     diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, rest);
     AddRest(one, s, place);
+    // Of the model that the report ends with, as far as the last session's touches know it.
+    if (s == taking_part().back() && AsksForNoiseAlone(one)) {
+      diagnosis_.posterior = one.posterior;
+      last_session_ = s;
+    }
     AddMistakes(one, s);
     report::DataReport& data = one.data[0];
     const double ratio = changes().heldout[place].ratio;
@@ -336,6 +344,18 @@ class SessionsReporter {
     return absl::OkStatus();
   }
 
+  // Budgets on the last session's touches, with what differs between sessions.
+  absl::Status AddReproducibility() {
+    if (!diagnosis_.posterior) return absl::OkStatus();
+    uncertainty::Posterior& posterior = *diagnosis_.posterior;
+    AddBetweenSessions(changes().effects, &posterior);
+    if (diagnosis_.improved_model) posterior.model.name = diagnosis_.improved_model->name;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis budgets,
+                                UncertaintyOfPlan(sessions_[last_session_], posterior, Stretch(1, 1)));
+    diagnosis_.uncertainty = budgets.uncertainty;
+    return absl::OkStatus();
+  }
+
   // What all sessions together say.
   void AssessAll() {
     if (!changes().steps.empty())
@@ -362,6 +382,7 @@ class SessionsReporter {
   bool noise_moved_ = false;               // a session has another noise than the given model
   std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
   std::vector<report::AskedByOne> still_;
+  int last_session_ = 0;  // whose touches the posterior is of
 };
 
 }  // namespace

@@ -24,6 +24,7 @@
 #include "server/diagnosis/selection/ladder.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"
+#include "server/diagnosis/uncertainty_reports.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {
@@ -84,6 +85,17 @@ struct PhotographEffects {
       if (data.unexplained && data.unexplained->model_with) put_back(&*data.unexplained->model_with);
     for (report::Step& step : diagnosis->steps)
       if (!step.model.effects.empty()) put_back(&step.model);
+    if (!diagnosis->posterior) return;
+    if (diagnosis->improved_model) {
+      put_back(&diagnosis->posterior->model);
+      return;
+    }
+    // The given model, whose effects of photographs may stand anywhere.
+    std::vector<int> places;
+    for (size_t i = 0; i < given->effects.size(); ++i)
+      if (!given->effects[i].effect->of_photos()) places.push_back(static_cast<int>(i));
+    for (uncertainty::OpenValue& value : diagnosis->posterior->values) value.effect = places[value.effect];
+    diagnosis->posterior->model = *given;
   }
   void NameGiven(report::Diagnosis* diagnosis) const {
     diagnosis->model_name = given->name;
@@ -223,6 +235,8 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   report::AddResiduals(DescribeBoth(*workspace, initial, touches::Residuals(o, initial), ladder.prediction,
                                     ladder.residuals, ladder.noise_floor.sigma),
                        &diagnosis.data[0]);
+  TOUCHSTONE_RETURN_IF_ERROR(
+      AddUncertainty(*workspace->predictor, ladder.prediction, ladder.posterior, &diagnosis));
   AddSentences(&diagnosis);
   TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.detectable,
                               engine::FindDetectable(*selection.search, selection.fit,

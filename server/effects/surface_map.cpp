@@ -66,6 +66,26 @@ double SurfaceDeparture::StdDevAt(const Eigen::Vector3d& point_m) const {
   return std::sqrt(open + std::max(0.0, weights.dot(variances_m2_)));
 }
 
+Eigen::MatrixXd SurfaceDeparture::CovarianceAt(const std::vector<Eigen::Vector3d>& points_m) const {
+  const int n = static_cast<int>(points_m.size());
+  std::vector<Eigen::VectorXd> kernels, weights;
+  std::vector<double> support_m;
+  for (const Eigen::Vector3d& point_m : points_m) {
+    kernels.push_back(KernelAt(point_m));
+    weights.push_back(kernel_.solve(kernels.back()));
+    support_m.push_back(std::sqrt(std::max(0.0, weights.back().dot(variances_m2_))));
+  }
+  Eigen::MatrixXd covariance(n, n);
+  for (int a = 0; a < n; ++a)
+    for (int b = 0; b <= a; ++b) {
+      const double alike = Matern52((points_m[a] - points_m[b]).norm(), length_m_);
+      const double between = (alike - kernels[a].dot(weights[b])) * rms_m_ * rms_m_;
+      covariance(a, b) = covariance(b, a) =
+          (a == b ? std::max(0.0, between) : between) + support_m[a] * support_m[b] * alike;
+    }
+  return covariance;
+}
+
 double SurfaceDeparture::NearnessAt(const Eigen::Vector3d& point_m) const {
   return points_m_.empty() ? 0 : KernelAt(point_m).maxCoeff();
 }

@@ -21,6 +21,9 @@ class SurfaceDeparture {
 
   double At(const Eigen::Vector3d& point_m) const;        // m, along the outward normal
   double StdDevAt(const Eigen::Vector3d& point_m) const;  // m
+  // Covariance of the departures at several places, m^2: what lies between the points of support exactly,
+  // what is open about these as alike as departures are (the map does not keep their correlations).
+  Eigen::MatrixXd CovarianceAt(const std::vector<Eigen::Vector3d>& points_m) const;
   // The largest correlation with any point of support, 0 to 1: near 0 nothing is known.
   double NearnessAt(const Eigen::Vector3d& point_m) const;
   double length_m() const { return length_m_; }

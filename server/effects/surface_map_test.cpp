@@ -32,6 +32,17 @@ TEST(SurfaceMap, IsItsPointsAtThemAndTheMeshFarAway) {
   EXPECT_NEAR(departure.NearnessAt({0.01, 0, 0.05}), 1, 1e-12);
 }
 
+TEST(SurfaceMap, IsAsOpenAtTwoPlacesAsTheyAreAlike) {
+  const SurfaceDeparture departure(TwoPoints());
+  const std::vector<Eigen::Vector3d> places = {{0.005, 0, 0.05}, {0, 0, -1}, {0, 0.01, -1}};
+  const Eigen::MatrixXd covariance = departure.CovarianceAt(places);
+  for (int a = 0; a < 3; ++a) EXPECT_NEAR(std::sqrt(covariance(a, a)), departure.StdDevAt(places[a]), 1e-12);
+  // Half a length apart, where the map says nothing: as any such surface. Far apart: not at all.
+  const double v = std::sqrt(5.0) * 0.5;
+  EXPECT_NEAR(covariance(1, 2), 0.09e-6 * (1 + v + v * v / 3) * std::exp(-v), 1e-12);
+  EXPECT_NEAR(covariance(0, 1), 0, 1e-15);
+}
+
 TEST(SurfaceMap, FallsOffFromASinglePointAsTheFormatSays) {
   const SurfaceDeparture departure({20, 0.3, {{{0, 0, 0}, 0.2, 0}}});
   const double v = std::sqrt(5.0) * 0.5;  // half a length away

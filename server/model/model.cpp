@@ -1,5 +1,7 @@
 #include "server/model/model.h"
 
+#include <algorithm>
+
 #include <absl/strings/str_cat.h>
 
 #include "server/base/text.h"
@@ -57,6 +59,14 @@ std::string Model::Hash() const {
     }
   }
   return Sha256Hex(text);
+}
+
+Model DeterministicPart(const Model& model) {
+  Model part = model;
+  part.effects.erase(std::remove_if(part.effects.begin(), part.effects.end(),
+                                    [](const EffectInstance& instance) { return instance.effect->random(); }),
+                     part.effects.end());
+  return part;
 }
 
 Model NominalModel(int fingers, double spacing_m) {

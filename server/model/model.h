@@ -54,6 +54,9 @@ enum class FileContent { kWithin, kBeside };
 // The model as a file that ParseModel reads back to the same hash.
 std::string FormatModel(const Model& model, FileContent content = FileContent::kWithin);
 
+// The model without random effects (Effect::random).
+Model DeterministicPart(const Model& model);
+
 // The nominal model: no noise, no effect.
 Model NominalModel(int fingers = 3, double spacing_m = 0.030);
 

@@ -70,6 +70,7 @@ const std::vector<MethodRole>& MethodRoles() {
       {"/touchstone.v1.Diagnosis/Propose", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Check", kReader, kReader},
       {"/touchstone.v1.Diagnosis/Explain", kReader, kReader},
+      {"/touchstone.v1.Diagnosis/Uncertainty", kReader, kReader},
       {"/touchstone.v1.Rig/GetRig", kReader, kReader},
       {"/touchstone.v1.Rig/CheckTouches", kReader, kReader},
       {"/touchstone.v1.Rig/CheckViews", kReader, kReader},

@@ -19,6 +19,7 @@
 #include "server/effects/all_effects.h"
 #include "server/service/convert.h"
 #include "server/service/evidence.h"
+#include "server/uncertainty/posterior_message.h"
 
 namespace touchstone::service {
 namespace {
@@ -375,6 +376,22 @@ grpc::Status DiagnosisService::Explain(grpc::ServerContext* context, const v1::E
       }};
   v1::Report report;
   return ToGrpc(RunAndSend(context, request->evidence(), work, resources_, writer, &report));
+}
+
+grpc::Status DiagnosisService::Uncertainty(grpc::ServerContext* context,
+                                           const v1::UncertaintyRequest* request,
+                                           grpc::ServerWriter<v1::UncertaintyResponse>* writer) {
+  const absl::StatusOr<uncertainty::Posterior> posterior = uncertainty::FromMessage(request->posterior());
+  if (!posterior.ok()) return ToGrpc(posterior.status());
+  const Work work = {
+      [&posterior](const diagnosis::DiagnosisInput& input, const diagnosis::DiagnosisContext& how) {
+        return AsReport(touchstone::diagnosis::Uncertainty(input, *posterior, how));
+      },
+      TimesOfSet::kNotRead};
+  v1::Evidence evidence = request->evidence();
+  evidence.mutable_model()->set_yaml(request->posterior().model_yaml());
+  v1::Report report;
+  return ToGrpc(RunAndSend(context, evidence, work, resources_, writer, &report));
 }
 
 }  // namespace touchstone::service

@@ -20,6 +20,8 @@ class DiagnosisService final : public v1::Diagnosis::Service {
                      grpc::ServerWriter<v1::CheckResponse>*) override;
   grpc::Status Explain(grpc::ServerContext*, const v1::ExplainRequest*,
                        grpc::ServerWriter<v1::ExplainResponse>*) override;
+  grpc::Status Uncertainty(grpc::ServerContext*, const v1::UncertaintyRequest*,
+                           grpc::ServerWriter<v1::UncertaintyResponse>*) override;
 
  private:
   Resources* resources_;

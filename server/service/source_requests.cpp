@@ -12,6 +12,7 @@
 #include "server/base/text.h"
 #include "server/service/convert.h"
 #include "server/service/source_messages.h"
+#include "server/uncertainty/posterior_message.h"
 
 namespace touchstone::service {
 namespace {
@@ -243,9 +244,22 @@ absl::StatusOr<source::SampleRequest> FromProto(const v1::StreamDatasetRequest& 
   request.objects.assign(spec.objects().begin(), spec.objects().end());
   dataset::DatasetSpecification& specification = request.specification;
   TOUCHSTONE_ASSIGN_OR_RETURN(specification.plan, FromProto(spec.plan()));
-  if (spec.has_model() && Simulates(resources)) {
+  // Where none is named, a posterior brings its own.
+  const bool names_model = spec.model().ref_case() != v1::ModelRef::REF_NOT_SET;
+  if (spec.has_model() && Simulates(resources) && (names_model || !spec.has_posterior())) {
     TOUCHSTONE_ASSIGN_OR_RETURN(specification.model, FromProto(spec.model(), resources));
   }
+  if (!Simulates(resources) && (spec.has_posterior() || spec.draw_models()))
+    return absl::InvalidArgumentError(
+        "posterior: a rig touches with what it is, not with a model that is drawn; leave posterior and "
+        "draw_models out");
+  if (spec.has_posterior()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(uncertainty::Posterior posterior, uncertainty::FromMessage(spec.posterior()));
+    if (specification.model == nullptr)
+      specification.model = std::make_shared<const model::Model>(posterior.model);
+    specification.posterior = std::make_shared<const uncertainty::Posterior>(std::move(posterior));
+  }
+  specification.draw_models = spec.draw_models();
   specification.seed = spec.seed();
   specification.samples = spec.samples();
   TOUCHSTONE_ASSIGN_OR_RETURN(specification.columns, dataset::ColumnChoice::FromNames(

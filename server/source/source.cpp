@@ -108,7 +108,8 @@ SampleHeader HeaderOf(const dataset::DatasetSpecification& specification, int fi
   for (const auto& object : specification.objects) header.mesh_hashes.push_back(object->hash());
   header.fingers = fingers;
   header.spacing_m = spacing_m;
-  header.columns = dataset::ColumnsOf(specification.columns, specification.image, fingers);
+  header.columns = dataset::ColumnsOf(specification.columns, specification.image, fingers,
+                                      dataset::OpenValuesOf(specification));
   return header;
 }
 

@@ -36,7 +36,7 @@ from .models import Description, Effect, Model, ObjectInfo, Parameter
 from .permutation import Permutation
 from .plans import FacesPlan, SpherePlan, Touches, faces, sphere, touches
 from .report import Report
-from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, UncertaintyBudget, Value, Versus
 from .rig import Rig, TouchCheck
 from .samples import Samples
 from .session import Session, touch_id
@@ -48,6 +48,6 @@ __all__ = [
     "EncodedImages", "Explanation", "FacesPlan", "Header", "ImageOptions", "InvalidRequest", "Lease", "Mesh", "Model",
     "NotFound", "ObjectInfo", "Parameter", "Permutation", "Quality", "Refused", "Report", "Rig", "Row", "Rows", "Samples",
     "Session", "Sessions", "SourceChanged", "SourceFailed", "SourceUnreachable", "SpherePlan", "Step", "Tabular", "TouchCheck", "Touches",
-    "TouchstoneError", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",
+    "TouchstoneError", "UncertaintyBudget", "Value", "Versus", "__version__", "box_touches", "connect", "faces", "image", "read_plan",
     "sphere", "touch_id", "touches", "write_measurements",
 ]

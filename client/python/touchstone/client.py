@@ -22,6 +22,7 @@ from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .own_server import OwnServer
 from .plans import PlanLike, Touches, plan_message
+from .posterior import PosteriorLike
 from .printable import printable
 from .retry import RETRY_FOR_S, Retry
 from .rig import Rig
@@ -334,8 +335,9 @@ class Client(Diagnosis):
     def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                image: ImageLike | None = None, max_draws: int = 0, batch_size: int | None = None,
-                start: int = 0, stop: int | None = None, stride: int = 1, units: str = "lab",
+                image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
+                models_from: PosteriorLike = None, batch_size: int | None = None, start: int = 0,
+                stop: int | None = None, stride: int = 1, units: str = "lab",
                 session: str = "") -> Dataset:
         """A dataset to iterate over; sample i is the same bits whoever asks, however it is cut into batches.
 
@@ -352,6 +354,10 @@ class Client(Diagnosis):
             "image" if `image` is given.
           image: touchstone.image(...), or (width, height).
           max_draws: draws for one index before the stream fails; 0: the source's own limit.
+          uncertainty: the Report (or its file) of the diagnosis that found the model: adds the columns "std_uncertainty_us" of
+            each contact time, less the mean over its touch, and "beyond_measured" (1: nothing was measured near).
+          models_from: the same report: each sample has a model of its own, drawn from what the report leaves open. The
+            column "model_values" has its values, in the order of report.message.posterior.values.
           batch_size: samples a batch; default 4096, 64 with images.
           start, stop: a part of the dataset, samples start .. stop - 1.
           stride: of every `stride` batches the first is delivered: worker w of W takes
@@ -363,6 +369,7 @@ class Client(Diagnosis):
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
             touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
+            uncertainty=uncertainty, models_from=models_from,
         )
         # A connection of its own: losing one stream must not close another's channel.
         return Dataset(
@@ -374,7 +381,8 @@ class Client(Diagnosis):
     def samples(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                image: ImageLike | None = None, max_draws: int = 0, units: str = "lab",
+                image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
+                models_from: PosteriorLike = None, units: str = "lab",
                 session: str = "") -> Samples:
         """A dataset by index, `samples[i]` or `samples[[3, 1, 7]]`: the same samples as those of dataset().
 
@@ -384,6 +392,7 @@ class Client(Diagnosis):
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
             touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
+            uncertainty=uncertainty, models_from=models_from,
         )
         return Samples(
             self._connection.another(), spec, si=si, hold_lease=self.holding_lease,

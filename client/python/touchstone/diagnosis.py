@@ -1,4 +1,4 @@
-"""compare(), diagnose(), propose(), check() and explain() of a Client."""
+"""compare(), diagnose(), propose(), check(), explain() and uncertainty() of a Client."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from . import checks, errors
 from .connection import Connection
 from .evidence import MeasurementsLike, MeshesLike, evidence, sessions
 from .models import ModelLike, model_ref
+from .posterior import posterior
 from .report import Report
 from .retry import Retry
 from .v1 import diagnosis_pb2, diagnosis_pb2_grpc
@@ -102,6 +103,17 @@ class Diagnosis:
         """Why one effect is, or is not, what the model lacks: report.explained. Of touches with poses."""
         request = diagnosis_pb2.ExplainRequest(evidence=evidence(measurements, model, meshes, (), 0), effect=effect)
         return self._report("Explain", request, on_progress)
+
+    def uncertainty(self, report: Report | str | os.PathLike[str], plan: str | os.PathLike[str], *, meshes: MeshesLike = None,
+                    on_progress: OnProgress | None = None) -> Report:
+        """How well the model of a diagnosis predicts the touches of a plan: .uncertainty of the report that it answers with.
+
+        Args:
+          report: of diagnose() on touches, or the file that it was saved as.
+          plan: a measurement file; its times, if it has any, are not read.
+        """
+        request = diagnosis_pb2.UncertaintyRequest(evidence=evidence(plan, None, meshes, (), 0), posterior=posterior(report))
+        return self._report("Uncertainty", request, on_progress)
 
     def _report(self, method: str, request: Any, on_progress: OnProgress | None) -> Report:
         """The last message of a stream; asked for again at the next source if one is lost."""

@@ -15,7 +15,7 @@ from .errors import InvalidRequest
 from .measurements import Row
 from .plans import Touches
 from .printable import printable
-from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, Value, Versus
+from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, UncertaintyBudget, Value, Versus
 from .tabular import Rows, Tabular
 from .v1 import diagnosis_pb2
 from .whole_file import whole_file
@@ -131,6 +131,12 @@ class Report(Tabular):
         return Rows(map(_detectable, self.message.detectable))
 
     @property
+    def uncertainty(self) -> Rows[UncertaintyBudget]:
+        """How well the model that the report ends with predicts touches like these, an entry per object and one of all (object
+        ""): of diagnose() on touches, and of uncertainty()."""
+        return Rows(map(_budget, self.message.uncertainty))
+
+    @property
     def explained(self) -> Explanation | None:
         """Of explain()."""
         if not self.message.HasField("explained"):
@@ -243,6 +249,14 @@ def _detectable(d: diagnosis_pb2.DetectableEffect) -> Detectable:
         d.effect, " ".join(part for part in (d.parameter, d.finger) if part), d.stage, d.std_error, d.typical,
         d.power_at_typical, d.found_from if d.HasField("found_from") else None, d.rival, d.correlation,
         d.told_from if d.HasField("told_from") else None, d.parted_by,
+    )
+
+
+def _budget(b: diagnosis_pb2.UncertaintyBudget) -> UncertaintyBudget:
+    return UncertaintyBudget(
+        b.object, b.touches, b.parameters, b.surface, b.repeatability, b.reproducibility if b.HasField("reproducibility") else None,
+        b.combined, b.largest, b.beyond_measured, b.contributions[0].name if b.contributions else "",
+        b.contributions[0].share if b.contributions else 0.0, b,
     )
 
 

@@ -133,6 +133,60 @@ class Detectable:
 
 
 @dataclasses.dataclass(frozen=True)
+class UncertaintyBudget:
+    """Standard uncertainties, us, of a finger's next contact time as a model predicts it, less the mean over its touch: root
+    mean squares over touches. report.uncertainty has to_pandas(), to_arrow() and plot().
+
+    Attributes:
+      object: "": of all.
+      touches: how many meet the object with two fingers or more; repeats of a pose count once.
+      parameters_us, surface_us, repeatability_us: of the model's values, of the surface's departure from its mesh, of the
+        noise of one reading.
+      reproducibility_us: of values that differ from session to session; None: not estimated, the model is of one session.
+      combined_us, largest_us: all of them; and that of the worst finger of the worst touch.
+      beyond_measured: touches that meet the object where nothing was measured near.
+      source, share: what contributes most ("repeatability", an effect), and its share of the combined variance.
+      message: all of it, touchstone.v1.UncertaintyBudget.
+    """
+
+    object: str
+    touches: int
+    parameters_us: float
+    surface_us: float
+    repeatability_us: float
+    reproducibility_us: float | None
+    combined_us: float
+    largest_us: float
+    beyond_measured: int
+    source: str
+    share: float
+    message: diagnosis_pb2.UncertaintyBudget = dataclasses.field(repr=False, compare=False)
+
+    @property
+    def contributions_us(self) -> dict[str, float]:
+        """The effects alone and the rest by name, largest first. Correlations between effects are in parameters_us only."""
+        return {one.name: one.std_uncertainty for one in self.message.contributions}
+
+    @staticmethod
+    def _draw_all(rows: Sequence[UncertaintyBudget], axes: Any) -> None:
+        """Variances stacked: they add, standard uncertainties do not."""
+        names = [row.object or "all" for row in rows]
+        parts = {"parameters": [row.parameters_us for row in rows], "surface": [row.surface_us for row in rows],
+                 "repeatability": [row.repeatability_us for row in rows],
+                 "reproducibility": [row.reproducibility_us or 0.0 for row in rows]}
+        left = [0.0] * len(names)
+        for name, values in parts.items():
+            if not any(values):
+                continue
+            squares = [(value / 1000)**2 for value in values]
+            tabular.bars(axes, names, squares, left=left, label=name)
+            left = [begin + square for begin, square in zip(left, squares)]
+        axes.set_ylim(len(names) - 0.5, -0.5)
+        axes.set(xlabel="variance of a predicted contact time, ms^2")
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncol=len(parts), frameon=False)
+
+
+@dataclasses.dataclass(frozen=True)
 class Explanation(Tabular):
     """Why one effect is, or is not, what a model lacks.
 

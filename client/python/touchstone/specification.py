@@ -11,6 +11,7 @@ from .errors import InvalidRequest
 from .images import ImageLike, image as default_image, to_image
 from .models import ModelLike, model_ref
 from .plans import FacesPlan, PlanLike, SpherePlan, Touches, plan_message, sphere
+from .posterior import PosteriorLike, posterior
 from .v1 import source_pb2
 
 # Default samples per batch: enough to make a message's overhead small, and a few MB with images.
@@ -25,6 +26,7 @@ _GROUPS = {
     "contact_time": ("contact_time",),
     "pose": ("target", "approach", "lateral", "standoff", "speed"),
     "contact": ("contact_point", "normal"),
+    "std_uncertainty": ("std_uncertainty", "beyond_measured"),
 }
 _UNITS = ("_us", "_s", "_mm", "_m", "_mm_s", "_m_s")
 
@@ -41,7 +43,8 @@ def requested_columns(names: Sequence[str]) -> list[str]:
 def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                   seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                   touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                  image: ImageLike | None = None, max_draws: int = 0) -> source_pb2.DatasetSpec:
+                  image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
+                  models_from: PosteriorLike = None) -> source_pb2.DatasetSpec:
     """The message; arguments as in Client.dataset(). samples is resolved, so that the size is known here."""
     objects = [objects] if isinstance(objects, str) else list(objects)
     if not objects or not checks.is_sequence_of_text(objects):
@@ -87,7 +90,20 @@ def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *,
     )
     if "image" in names:
         spec.image.CopyFrom(options.to_proto())
+    _add_posterior(spec, uncertainty, models_from)
     return spec
+
+
+def _add_posterior(spec: source_pb2.DatasetSpec, uncertainty: PosteriorLike, models_from: PosteriorLike) -> None:
+    given = [posterior(report) for report in (models_from, uncertainty) if report is not None]
+    if not given:
+        return
+    if len(given) == 2 and given[0] != given[1]:
+        raise InvalidRequest("uncertainty and models_from are two reports; a dataset has the posterior of one.")
+    spec.posterior.CopyFrom(given[0])
+    spec.draw_models = models_from is not None
+    if uncertainty is not None and "std_uncertainty" not in spec.columns:
+        spec.columns.append("std_uncertainty")
 
 
 def _warn_of_faces_without_touches(plan: PlanLike, samples: int, objects: int) -> None:

@@ -43,6 +43,7 @@ from .images import ImageLike
 from .loader import TouchstoneLoader
 from .models import ModelLike
 from .plans import PlanLike
+from .posterior import PosteriorLike
 from .retry import RETRY_FOR_S
 from .shared_lease import LeaseSlot, SharedLease
 from .specification import resolve_batch_size, specification
@@ -82,7 +83,8 @@ class TouchstoneDataset(IterableDataset):
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                 image: ImageLike | None = None, max_draws: int = 0, batch_size: int | None = None,
+                 image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
+                 models_from: PosteriorLike = None, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
                  ranks: int | None = None, whole_rounds: bool = False, new_samples_each_epoch: bool = False,
                  retry_for_s: float = RETRY_FOR_S):
@@ -105,6 +107,7 @@ class TouchstoneDataset(IterableDataset):
         spec = specification(
             objects, plan, samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s,
             touch_interval_s=touch_interval_s, columns=columns, image=image, max_draws=max_draws,
+            uncertainty=uncertainty, models_from=models_from,
         )
         # Bytes travel to spawned workers whatever the protobuf version.
         self._spec = spec.SerializeToString()

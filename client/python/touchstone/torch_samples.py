@@ -16,6 +16,7 @@ from .images import ImageLike
 from .models import ModelLike
 from .permutation import Permutation
 from .plans import PlanLike
+from .posterior import PosteriorLike
 from .retry import RETRY_FOR_S
 from .samples import Samples
 from .specification import specification
@@ -39,7 +40,8 @@ class TouchstoneSamples(Dataset):
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
-                 image: ImageLike | None = None, max_draws: int = 0, retry_for_s: float = RETRY_FOR_S):
+                 image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
+                 models_from: PosteriorLike = None, retry_for_s: float = RETRY_FOR_S):
         """Arguments as in Client.samples(), and:
 
         Args:
@@ -47,7 +49,7 @@ class TouchstoneSamples(Dataset):
           retry_for_s: how long a lost source is tried again.
         """
         given: dict[str, Any] = dict(samples=samples, seed=seed, model=model, speed_mm_s=speed_mm_s, touch_interval_s=touch_interval_s,
-                     columns=columns, image=image, max_draws=max_draws)
+                     columns=columns, image=image, max_draws=max_draws, uncertainty=uncertainty, models_from=models_from)
         if isinstance(target, Client):
             self.samples = target.samples(objects, plan, **given)
         else:

@@ -15,16 +15,6 @@ namespace {
 
 constexpr char kAsItIs[] = "the model as it is";
 
-// The same touches with times, all 0: which finger reports and when is the model's business.
-DiagnosisInput WithTimes(const DiagnosisInput& input) {
-  auto set = std::make_shared<session::MeasurementSet>(*input.set);
-  set->fingers = input.model->fingers;
-  set->time_s.assign(static_cast<size_t>(set->size()) * set->fingers, 0.0);
-  DiagnosisInput timed = input;
-  timed.set = std::move(set);
-  return timed;
-}
-
 // Standard deviation of one finger's time under the model's noise, s: as it says, or as a draw of every touch scatters.
 absl::StatusOr<double> NoiseOf(const selection::Workspace& workspace) {
   const model::Model& model = *workspace.input.model;
@@ -99,6 +89,15 @@ absl::StatusOr<std::vector<ProposedTouch>> Improve(const PlanCheck& check, const
 
 }  // namespace
 
+DiagnosisInput AsPlan(const DiagnosisInput& input) {
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  set->fingers = input.model->fingers;
+  set->time_s.assign(static_cast<size_t>(set->size()) * set->fingers, 0.0);
+  DiagnosisInput timed = input;
+  timed.set = std::move(set);
+  return timed;
+}
+
 absl::StatusOr<PlanCheck> CheckPlan(const DiagnosisInput& input, const PlanQuestion& question,
                                     const DiagnosisContext& context) {
   if (input.set == nullptr || input.images != nullptr || !input.set->has_poses)
@@ -107,7 +106,7 @@ absl::StatusOr<PlanCheck> CheckPlan(const DiagnosisInput& input, const PlanQuest
         "nothing");
   TOUCHSTONE_RETURN_IF_ERROR(CheckQuestion(question));
   PlanCheck check;
-  TOUCHSTONE_ASSIGN_OR_RETURN(check.workspace, selection::MakeWorkspace(WithTimes(input), context));
+  TOUCHSTONE_ASSIGN_OR_RETURN(check.workspace, selection::MakeWorkspace(AsPlan(input), context));
   selection::Workspace& workspace = *check.workspace;
   workspace.observations->time_s = workspace.nominal.time_s;
   check.sigma_s = question.sigma_s;

@@ -29,6 +29,9 @@ struct PlanCheck {
   std::vector<ProposedTouch> proposed;  // most helpful first
 };
 
+// The same touches with times, all 0: which finger reports and when is the model's business.
+DiagnosisInput AsPlan(const DiagnosisInput& input);
+
 // `input`: a set of touches with poses, whose times are not read. Errors: a model without noise where none is given, an
 // effect that the plan's search has not, what MakeWorkspace finds.
 absl::StatusOr<PlanCheck> CheckPlan(const DiagnosisInput& input, const PlanQuestion& question,

@@ -5,7 +5,6 @@
 
 #include "server/base/check.h"
 #include "server/base/normal.h"
-#include "server/model/finger_name.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::engine {
@@ -32,18 +31,6 @@ std::vector<std::vector<double>> Directions(const model::ParameterInfo& paramete
 }
 
 }  // namespace
-
-std::string NameOf(const model::Effect& effect) {
-  if (effect.lookup) return "lookup " + effect.lookup->name;
-  return effect.formula ? "formula " + effect.formula->name : effect.name;
-}
-
-std::string EntryName(const model::ParameterInfo& parameter, int entry, int fingers) {
-  if (parameter.arity == model::Arity::kVector3 || parameter.arity == model::Arity::kVector2)
-    return std::string(1, "xyz"[entry]);
-  if (parameter.arity == model::Arity::kPerFinger) return model::FingerName(entry, fingers);
-  return "";
-}
 
 Parameterization::Parameterization(model::Model base, std::vector<std::string> objects)
     : base_(std::move(base)), objects_(std::move(objects)) {

@@ -10,6 +10,7 @@
 
 #include "server/diagnosis/engine/parameter_estimate.h"
 #include "server/model/model.h"
+#include "server/model/value_names.h"
 
 namespace touchstone::diagnosis::engine {
 
@@ -73,10 +74,7 @@ class Parameterization {
   int shapes_ = 0;
 };
 
-// "tip_radius", or "formula lead_screw".
-std::string NameOf(const model::Effect& effect);
-
-// "l", "x", or empty: which entry of a parameter.
-std::string EntryName(const model::ParameterInfo& parameter, int entry, int fingers);
+using model::EntryName;
+using model::NameOf;
 
 }  // namespace touchstone::diagnosis::engine

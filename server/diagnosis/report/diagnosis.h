@@ -20,6 +20,8 @@
 #include "server/diagnosis/residuals/model_comparison.h"
 #include "server/diagnosis/touches/data_summary.h"
 #include "server/diagnosis/touches/same_poses.h"
+#include "server/uncertainty/budget.h"
+#include "server/uncertainty/posterior.h"
 
 namespace touchstone::diagnosis::report {
 
@@ -194,6 +196,9 @@ struct Diagnosis {
   std::vector<engine::DetectableValue> detectable;
   std::optional<ReportedExplanation> explained;
   std::optional<Sessions> sessions;
+  // Of the model that the report ends with, and how well it predicts touches like these.
+  std::optional<uncertainty::Posterior> posterior;
+  std::vector<uncertainty::Budget> uncertainty;
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this

@@ -93,6 +93,7 @@ void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   if (ladder.unexplained) data.unexplained = InMicroseconds(*ladder.unexplained);
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
   if (ladder.changed) diagnosis->improved_model = ladder.improved;
+  diagnosis->posterior = ladder.posterior;
 }
 
 void AddResiduals(residuals::ResidualSummary residuals, DataReport* data) {

@@ -194,6 +194,9 @@ Verdict WorseOf(Verdict one, Verdict other) {
 
 Diagnosis SideBySide(Diagnosis touches, Diagnosis photographs) {
   Diagnosis both = std::move(touches);
+  // One of touches alone is none of a model that photographs have a part in.
+  both.posterior.reset();
+  both.uncertainty.clear();
   both.verdict = WorseOf(both.verdict, photographs.verdict);
   both.model_name = photographs.model_name;
   both.model_hash = photographs.model_hash;

@@ -4,6 +4,7 @@
 #include "server/diagnosis/report/write_answers.h"
 #include "server/diagnosis/report/write_data_report.h"
 #include "server/diagnosis/report/write_sessions.h"
+#include "server/uncertainty/posterior_message.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -111,6 +112,9 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   if (diagnosis.explained)
     WriteExplanation(*diagnosis.explained, diagnosis.data[0].fingers, report.mutable_explained());
   if (diagnosis.sessions) WriteSessions(*diagnosis.sessions, report.mutable_sessions());
+  if (diagnosis.posterior) *report.mutable_posterior() = uncertainty::ToMessage(*diagnosis.posterior);
+  for (const uncertainty::Budget& budget : diagnosis.uncertainty)
+    *report.add_uncertainty() = uncertainty::ToMessage(budget);
   report.set_duration_s(diagnosis.duration_s);
   return report;
 }

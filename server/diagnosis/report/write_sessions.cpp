@@ -43,7 +43,7 @@ void WriteBySession(const joint::ComparedValue& value, const std::vector<int>& t
     known.push_back({estimate.value, estimate.std_error});
     written.push_back(to);
   }
-  if (known.size() < 3) return;
+  if (known.size() < joint::kMinForScatter) return;
   const joint::ControlChart chart = joint::MakeControlChart(known);
   message->set_between_sessions(chart.inside.std_deviation);
   for (size_t i = 0; i < chart.limits.size(); ++i) {

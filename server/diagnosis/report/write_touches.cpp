@@ -42,6 +42,8 @@ void WriteSurfacePoint(const residuals::SurfaceResidual& point, v1::SurfacePoint
   message->set_residual(Microseconds(point.residual_s));
   message->set_after(Microseconds(point.improved_residual_s));
   message->set_finger(static_cast<uint32_t>(point.finger));
+  message->set_std_uncertainty(Microseconds(point.std_uncertainty_s));
+  message->set_beyond_measured(point.beyond_measured);
 }
 
 void WriteOutline(const residuals::DrawableObject& outline, v1::ObjectOutline* message) {

@@ -19,6 +19,8 @@ struct SurfaceResidual {
   double residual_s = 0;           // of the initial model; measured minus simulated
   double improved_residual_s = 0;  // of the improved model; 0 where it misses
   int finger = 0;                  // 0 is the first
+  double std_uncertainty_s = 0;    // of the improved model's time; 0: not known
+  bool beyond_measured = false;    // nothing was measured near
 };
 
 // Object by object, at most 4,000 points in all and 1,500 per object, evenly spread over the poses. `before`

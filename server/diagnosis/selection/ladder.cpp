@@ -15,6 +15,7 @@
 #include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/dropouts.h"
+#include "server/diagnosis/selection/model_posterior.h"
 #include "server/diagnosis/selection/pose_scatter.h"
 #include "server/diagnosis/selection/round_structure.h"
 #include "server/diagnosis/selection/session_order.h"
@@ -41,7 +42,8 @@ constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
-absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit) {
+absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit,
+                                   int max_iterations = engine::kMaxIterations) {
   if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
   const touches::Observations& o = *workspace.observations;
   const touches::Contrasts contrasts = WeighedContrasts(workspace, o, workspace.nominal.time_s);
@@ -52,7 +54,7 @@ absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit
   all.observations = &rows;
   all.likelihood = &likelihood;
   all.pool = nullptr;  // the predictor has the threads
-  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit whole, engine::FitModel(all, fit.model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit whole, engine::FitModel(all, fit.model, max_iterations));
   whole.columns = fit.columns;  // held-out errors come from the search's touches
   return whole;
 }
@@ -153,6 +155,7 @@ class LadderBuilder {
                       : ladder_.values_wrong   ? engine::Verdict::kWrongValues
                                                : engine::Verdict::kAdequate;
     if (ladder_.changed && !ladder_.improved.name.empty()) ladder_.improved.name += "_better";
+    TOUCHSTONE_RETURN_IF_ERROR(AddPosterior());
     return std::move(ladder_);
   }
 
@@ -184,6 +187,16 @@ class LadderBuilder {
     AddTimeStructure(o, best, &ladder_.noise_floor);
     ladder_.noise_floor.declared = DeclaredSigma(*workspace_.input.model);
     ladder_.dropouts = DropoutsInWords(o, ladder_.prediction);
+    return absl::OkStatus();
+  }
+
+  absl::Status AddPosterior() {
+    engine::Fit open = fit_;
+    if (const auto everything = WithEverythingFree(fit_, ladder_.improved)) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(open, engine::FitModel(workspace_.experiment, *everything, 0));
+      TOUCHSTONE_ASSIGN_OR_RETURN(open, FitAll(workspace_, open, 0));
+    }
+    ladder_.posterior = PosteriorOf(workspace_, open, saved_, ladder_);
     return absl::OkStatus();
   }
 

@@ -9,6 +9,7 @@
 #include "server/diagnosis/engine/set_aside.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/selection.h"
+#include "server/uncertainty/posterior.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -25,11 +26,12 @@ struct Ladder {
   std::optional<engine::UnexplainedRest> unexplained;
   engine::SetAside set_aside;  // outliers
 
-  model::Model improved;           // the initial model with steps and refits, without a formula
-  bool changed = false;            // improved differs from the initial model
-  bool values_wrong = false;       // an effect of the initial model, other than noise, has other values
-  std::vector<double> residuals;   // of the improved model, all touches, s
-  touches::Prediction prediction;  // of the improved model, with details
+  model::Model improved;             // the initial model with steps and refits, without a formula
+  bool changed = false;              // improved differs from the initial model
+  bool values_wrong = false;         // an effect of the initial model, other than noise, has other values
+  std::vector<double> residuals;     // of the improved model, all touches, s
+  touches::Prediction prediction;    // of the improved model, with details
+  uncertainty::Posterior posterior;  // of the improved model
 };
 
 // Takes steps out of the selection with which the error, as a comparison finds it, does not fall.

@@ -175,8 +175,9 @@ double OwnScatterShare(const touches::Observations& o, const std::vector<Reading
 }
 
 // Nothing where one scatter says the same. The p-value is of this partition alone.
-std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& groups, const Partition& partition,
-                                     const NoiseModel& model, double own_share) {
+std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& groups,
+                                            const Partition& partition, const NoiseModel& model,
+                                            double own_share) {
   std::vector<std::string> names;
   const ScatterParts parts = ScatterPartsOf(groups, partition, &names);
   if (parts.size() < 2) return std::nullopt;

@@ -24,15 +24,6 @@ bool DependsOnSession(const model::Model& model) {
 
 }  // namespace
 
-model::Model DeterministicPart(const model::Model& model) {
-  model::Model part = model;
-  part.effects.erase(
-      std::remove_if(part.effects.begin(), part.effects.end(),
-                     [](const model::EffectInstance& instance) { return instance.effect->random(); }),
-      part.effects.end());
-  return part;
-}
-
 Predictor::Predictor(const Observations& observations, ThreadPool* pool)
     : observations_(observations), pool_(pool), first_of_pose_(observations.poses, -1) {
   std::vector<int> all(observations.size());
@@ -88,6 +79,21 @@ void Predictor::ForBlocks(const std::vector<Block>& blocks,
   };
   const int count = static_cast<int>(blocks.size());
   ParallelFor(count > 1 ? pool_ : nullptr, count, 1, run);
+}
+
+void Predictor::ForPoses(
+    const std::vector<double>& previous_press_m,
+    const std::function<void(int, const std::vector<int>&, const FillBatch&)>& body) const {
+  ForBlocks(pose_blocks_, [&](const Block& block) {
+    body(static_cast<int>(&block - pose_blocks_.data()), block.touches,
+         [&](const touch::TouchSimulator& simulator, effects::TouchBatch* batch) {
+           Fill(block, simulator, batch);
+           for (size_t t = 0; t < block.touches.size(); ++t)
+             for (int i = 0; i < observations_.fingers; ++i)
+               batch->previous_press_m[batch->At(i, static_cast<int>(t))] =
+                   previous_press_m[static_cast<size_t>(block.touches[t]) * observations_.fingers + i];
+         });
+  });
 }
 
 // One prediction under way: simulation block by block, then copies for the repeats of a pose.

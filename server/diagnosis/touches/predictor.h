@@ -1,6 +1,7 @@
 // Predictions of one experiment under many models: what is the same for all is prepared once.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -9,8 +10,7 @@
 
 namespace touchstone::diagnosis::touches {
 
-// The model without random effects (Effect::random).
-model::Model DeterministicPart(const model::Model& model);
+using model::DeterministicPart;
 
 class Predictor {
  public:
@@ -27,6 +27,14 @@ class Predictor {
   // vector and by `along_binormal_m` along approach x lateral. [k * fingers + finger]
   absl::StatusOr<std::vector<double>> TravelWhenMoved(const model::Model& model, double along_lateral_m,
                                                       double along_binormal_m) const;
+
+  // The first touch of every pose, in batches of one object, by several threads at once: `body` is given the
+  // batch's number, its touches, and what fills them into a batch for a simulator. `previous_press_m`: [k *
+  // fingers + finger].
+  using FillBatch = std::function<void(const touch::TouchSimulator&, effects::TouchBatch*)>;
+  void ForPoses(const std::vector<double>& previous_press_m,
+                const std::function<void(int, const std::vector<int>&, const FillBatch&)>& body) const;
+  int pose_batches() const { return static_cast<int>(pose_blocks_.size()); }
 
   const Observations& observations() const { return observations_; }
 

@@ -3,7 +3,7 @@ import { differences } from "./differences";
 import { parsePageData } from "./load";
 import type { DataReport, Report } from "./report";
 import { Touches } from "./touches";
-import { paint, refined } from "../object/paint";
+import { paint, refined, unpacked } from "../object/paint";
 
 const nan = Number.NaN;
 
@@ -49,4 +49,12 @@ test("the paint follows the contacts and fades where there are none", () => {
   const colours = paint(mesh, Float32Array.from([0, 0, 0]), Float32Array.from([1]), 10, [200, 200, 200], () => [0, 0, 0]);
   expect(colours[0]).toBeLessThan(60);
   expect(colours[3]).toBe(200);
+});
+
+test("contacts with a value come in fours", () => {
+  const { points, values, low, high } = unpacked([1, 2, 3, 10, 4, 5, 6, 30]);
+  expect(Array.from(points)).toEqual([1, 2, 3, 4, 5, 6]);
+  expect(Array.from(values)).toEqual([10, 30]);
+  expect([low, high]).toEqual([10, 30]);
+  expect(unpacked([0, 0, 0, 7]).high).toBeGreaterThan(7); // a scale has two ends
 });

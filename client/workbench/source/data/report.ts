@@ -152,7 +152,7 @@ export interface Words {
   finger_scatter: string; ladder: Rung[]; command: string; commands: { purpose: string; command: string }[];
   problems: { title: string; fix: string }[]; ambiguities: { effects: string[]; to_decide: string }[];
   next: string[]; steps: string[]; main?: number;
-  of_data: { kind_name: string; floor: number; floor_is_bound: boolean; finger_bias: string; nearest_effect: string }[];
+  of_data: { kind_name: string; floor: number; floor_is_bound: boolean; finger_bias: string; nearest_effect: string; uncertainty?: Record<string, number[]> }[]; // x y z (mm) and standard uncertainty
 }
 
 export interface PageData { report: Report; words: Words }

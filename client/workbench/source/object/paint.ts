@@ -32,6 +32,20 @@ export function refined(vertices: number[], triangles: number[]): Mesh {
   return { positions: Float32Array.from(positions), triangles: Uint32Array.from(corners) };
 }
 
+// Of x, y, z and a value of each contact in turn: the places, the values, and the least and the largest.
+export function unpacked(list: number[]): { points: Float32Array; values: Float32Array; low: number; high: number } {
+  const size = Math.floor(list.length / 4);
+  const points = new Float32Array(3 * size);
+  const values = new Float32Array(size);
+  for (let i = 0; i < size; ++i) {
+    for (let k = 0; k < 3; ++k) points[3 * i + k] = list[4 * i + k];
+    values[i] = list[4 * i + 3];
+  }
+  const low = values.reduce((a, b) => Math.min(a, b), Infinity);
+  const high = values.reduce((a, b) => Math.max(a, b), -Infinity);
+  return { points, values, low, high: Math.max(high, 1.01 * low) };
+}
+
 const maxSources = 1500; // contacts that are read; beyond this a part, evenly
 
 // Colours (0 to 255) of the mesh's corners. `reach`: how far a contact is seen, mm.

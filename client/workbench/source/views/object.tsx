@@ -4,7 +4,7 @@ import { css, diverging, isDark, rgbOf } from "../colour";
 import { tickText } from "../charts/scale";
 import { Tools } from "../parts/tools";
 import { count, error, isPictures, unitFor } from "../format";
-import { paint, refined } from "../object/paint";
+import { paint, refined, unpacked } from "../object/paint";
 import { movingPoints, ObjectScene, type Rod } from "../object/scene";
 import { entry, improved, limit as colourScale, object, page, selectTouch, shown, theme, touchIndex, touches, walk } from "../state";
 import type { Touches } from "../data/touches";
@@ -44,6 +44,22 @@ function Scale({ limit, data }: { limit: number; data: DataReport }) {
       <g fill="var(--soft)" font-size="11" text-anchor="middle">
         {[-limit, 0, limit].map((value) => <text x={Math.min(278, Math.max(22, x(value)))} y="31">{value > 0 ? "+" : ""}{tickText(Number((value * unit.factor).toPrecision(3)))}</text>)}
         <text x="10" y="46" text-anchor="start">earlier</text><text x="150" y="46">residual ({unit.symbol}){floor > 0 && floor < limit ? "; bars: noise floor" : ""}</text><text x="290" y="46" text-anchor="end">later</text>
+      </g>
+    </svg>
+  );
+}
+
+// Of the model's predictions, from the surest contact to the least sure one, x from 0 to 1: never the grey of what was not measured.
+const unsureColour = (x: number, night = isDark()) => diverging(0.25 + 0.75 * x, night);
+
+function UncertaintyScale({ low, high, data }: { low: number; high: number; data: DataReport }) {
+  const steps = 41;
+  return (
+    <svg class="colour-scale" viewBox="0 0 300 52" role="img" aria-label={`Painted: standard uncertainty from ${error(data.kind, low)}, pale orange, to ${error(data.kind, high)}, orange`}>
+      {Array.from({ length: steps }, (_, i) => <rect x={10 + (280 * i) / steps} y="4" width={280 / steps + 0.5} height="12" fill={css(unsureColour(i / (steps - 1)))} />)}
+      <g fill="var(--soft)" font-size="11">
+        <text x="10" y="31">{error(data.kind, low)}</text><text x="290" y="31" text-anchor="end">{error(data.kind, high)}</text>
+        <text x="150" y="46" text-anchor="middle">painted: standard uncertainty of a predicted time</text>
       </g>
     </svg>
   );
@@ -102,12 +118,15 @@ export function ObjectView() {
   const [scene, setScene] = useState<ObjectScene | null>(null);
   const [failed, setFailed] = useState("");
   const [painted, setPainted] = useState(true);
+  const [unsure, setUnsure] = useState(false); // painted in the place of the residuals
   const [hover, setHover] = useState("");
   const name = table && data ? objectToShow(table, data) : "";
   const limit = colourScale.value;
   const cells = useRef<{ of: string; table: Touches | null; list: number[] }>({ of: "", table: null, list: [] });
   if (table && (cells.current.of !== name || cells.current.table !== table)) cells.current = { of: name, table, list: cellsOf(table, name) };
   const list = cells.current.list;
+  const sureness = data && page.value!.words.of_data[page.value!.report.data.indexOf(data)]?.uncertainty?.[name];
+  const uncertainty = unsure && sureness ? unpacked(sureness) : null;
   const mesh = useRef<ReturnType<typeof refined> | null>(null);
 
   useEffect(() => {
@@ -151,9 +170,12 @@ export function ObjectView() {
       const solid = rgbOf("--solid");
       const known = list.filter((cell) => mask[cell] && !Number.isNaN(values[cell]) && !Number.isNaN(table.contact[3 * cell]));
       const from = painted ? known : [];
-      scene.paint(paint(mesh.current, contactsOf(table, from), Float32Array.from(from, (cell) => values[cell]), 0.055 * scene.size, solid, tone));
+      if (painted && uncertainty) {
+        const { points, values: unsureBy, low, high } = uncertainty;
+        scene.paint(paint(mesh.current, points, unsureBy, 0.055 * scene.size, solid, (value) => unsureColour((value - low) / (high - low), night)));
+      } else scene.paint(paint(mesh.current, contactsOf(table, from), Float32Array.from(from, (cell) => values[cell]), 0.055 * scene.size, solid, tone));
     }
-  }, [scene, table, name, mask, improved.value, night, painted, theme.value]);
+  }, [scene, table, name, mask, improved.value, night, painted, unsure, theme.value]);
 
   const next = page.value!.report.next.map((one, i) => ({ one, i })).filter(({ one }) => one.touch && one.object === name);
   const arrows = scene ? next.map(({ one, i }) => {
@@ -201,6 +223,7 @@ export function ObjectView() {
       <div class="plot-head">
         <div class="plot-title"><b>{name}</b> <span class="soft">{count(list.length)} contacts</span></div>
         <label class="check"><input type="checkbox" checked={painted} onChange={(event) => setPainted(event.currentTarget.checked)} /> paint</label>
+        {sureness && <label class="check"><input type="checkbox" checked={unsure} disabled={!painted} onChange={(event) => setUnsure(event.currentTarget.checked)} /> uncertainty</label>}
         <Tools title={`Residuals on ${name}`} svg={() => svg.current?.querySelector("svg") ?? null} under={() => `<image width="${canvas.current!.clientWidth}" height="${canvas.current!.clientHeight}" href="${scene?.picture()}"/>`}
           rows={() => [["touch", "finger", "x_mm", "y_mm", "z_mm", `residual_${data.unit}`, `after_${data.unit}`], ...list.filter((cell) => mask[cell]).map((cell) => [table.number[table.touchOf(cell)], table.names[table.fingerOf(cell)], table.contact[3 * cell], table.contact[3 * cell + 1], table.contact[3 * cell + 2], table.residual[cell], table.after[cell]])]} />
       </div>
@@ -215,7 +238,7 @@ export function ObjectView() {
         <span class="zoom"><button type="button" aria-label="Nearer" onClick={() => scene?.zoom(1.25)}>+</button><button type="button" aria-label="Farther" onClick={() => scene?.zoom(1 / 1.25)}>−</button></span>
         {hover && <div class="hover" role="status">{hover}</div>}
       </div>
-      <figcaption><Scale limit={limit} data={data} /><span>Each dot is one finger&rsquo;s contact, where the given model puts it; between them their mean is painted.{list.length > movingPoints && ` While it turns, an even sample of ${count(movingPoints)} is drawn.`}{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
+      <figcaption><div><Scale limit={limit} data={data} />{painted && uncertainty && <UncertaintyScale low={uncertainty.low} high={uncertainty.high} data={data} />}</div><span>{painted && uncertainty && "Painted is how sure the improved model is of a contact time; where it is grey nothing was measured near. "}Each dot is one finger&rsquo;s contact, where the given model puts it{painted && uncertainty ? "." : "; between them their mean is painted."}{list.length > movingPoints && ` While it turns, an even sample of ${count(movingPoints)} is drawn.`}{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
     </figure>
   );
 }

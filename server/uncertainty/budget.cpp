@@ -1,0 +1,74 @@
+#include "server/uncertainty/budget.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace touchstone::uncertainty {
+
+void BudgetSum::Add(const std::string& object, const TimeUncertainty& touches) {
+  Sums& sums = objects_[object];
+  sums.effects.resize(effects_.size(), 0);
+  const auto square = [](double value) { return value * value; };
+  const size_t fingers = static_cast<size_t>(touches.fingers);
+  for (size_t first = 0; first < touches.combined_s.size(); first += fingers) {
+    bool met = false, beyond = false;
+    for (size_t e = first; e < first + fingers; ++e) {
+      if (std::isnan(touches.combined_s[e])) continue;
+      met = true;
+      beyond |= touches.beyond_measured[e] != 0;
+      sums.fingers += 1;
+      sums.parameters += square(touches.parameters_s[e]);
+      sums.surface += square(touches.surface_s[e]);
+      sums.repeatability += square(touches.repeatability_s[e]);
+      sums.reproducibility += square(touches.reproducibility_s[e]);
+      sums.largest = std::max(sums.largest, touches.combined_s[e]);
+      for (size_t j = 0; j < effects_.size(); ++j) sums.effects[j] += square(touches.effects_s[j][e]);
+    }
+    sums.touches += met;
+    sums.beyond += beyond;
+  }
+}
+
+Budget BudgetSum::BudgetOf(const std::string& object, const Sums& sums) const {
+  Budget budget;
+  budget.object = object;
+  budget.touches = sums.touches;
+  budget.beyond_measured = sums.beyond;
+  if (sums.fingers == 0) return budget;
+  const auto root = [&sums](double sum) { return std::sqrt(sum / sums.fingers); };
+  budget.parameters_s = root(sums.parameters);
+  budget.surface_s = root(sums.surface);
+  budget.repeatability_s = root(sums.repeatability);
+  if (has_reproducibility_) budget.reproducibility_s = root(sums.reproducibility);
+  const double all = sums.parameters + sums.surface + sums.repeatability + sums.reproducibility;
+  budget.combined_s = root(all);
+  budget.largest_s = sums.largest;
+  const auto add = [&](const std::string& name, double sum) {
+    budget.contributions.push_back({name, root(sum), all > 0 ? sum / all : 0});
+  };
+  for (size_t j = 0; j < effects_.size(); ++j) add(effects_[j], sums.effects[j]);
+  add("surface", sums.surface);
+  add("repeatability", sums.repeatability);
+  if (has_reproducibility_) add("reproducibility", sums.reproducibility);
+  std::stable_sort(budget.contributions.begin(), budget.contributions.end(),
+                   [](const Contribution& a, const Contribution& b) { return a.share > b.share; });
+  return budget;
+}
+
+std::vector<Budget> BudgetSum::Budgets() const {
+  std::vector<Budget> budgets;
+  Sums all;
+  all.effects.resize(effects_.size(), 0);
+  for (const auto& [object, sums] : objects_) {
+    budgets.push_back(BudgetOf(object, sums));
+    all.touches += sums.touches, all.beyond += sums.beyond, all.fingers += sums.fingers;
+    all.parameters += sums.parameters, all.surface += sums.surface;
+    all.repeatability += sums.repeatability, all.reproducibility += sums.reproducibility;
+    all.largest = std::max(all.largest, sums.largest);
+    for (size_t j = 0; j < effects_.size(); ++j) all.effects[j] += sums.effects[j];
+  }
+  budgets.push_back(BudgetOf("", all));
+  return budgets;
+}
+
+}  // namespace touchstone::uncertainty
