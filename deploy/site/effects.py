@@ -18,10 +18,9 @@ def pages(made: dict[str, str]) -> None:
     unknown = {effect["stage"] for effect in catalogue} - listed
     if unknown:
         raise SystemExit(f"deploy/site/effects.py: no page has effects of the stage {', '.join(sorted(unknown))}")
-    lines = ["# The catalogue of effects", "",
-             f"{len(catalogue)} physical causes that a model can have, as `touchstone effects` lists them: a model is the nominal rig and "
-              "any of them. `touchstone diagnose` looks for them in measured sets.", "",
-             "| Effect | Stage | Parameters | What it is |", "| --- | --- | --- | --- |"]
+    about = (f"{len(catalogue)} physical causes that a model can have, as `touchstone effects` lists them: a model is the nominal rig and "
+             "any of them. `touchstone diagnose` looks for them in measured sets.")
+    lines = ["# The catalogue of effects", "", about, "", "| Effect | Stage | Parameters | What it is |", "| --- | --- | --- | --- |"]
     for path, (title, stages) in STAGES.items():
         page = [f"# {title}", ""]
         for stage in stages:
@@ -39,11 +38,11 @@ def text_of(effect):
     if physics := physics_of(effect["name"]):
         lines += ["```text", physics, "```", ""]
     if effect["parameters"]:
-        lines += ["| Parameter | Unit | Range | None | Typical | Meaning |", "| --- | --- | --- | --- | --- | --- |"]
+        lines += ["| Parameter | Unit | Range | Neutral | Typical | Meaning |", "| --- | --- | --- | --- | --- | --- |"]
         for one in effect["parameters"]:
             meaning = one["meaning"] + (" One value per finger." if one["arity"] == "finger" else "")
             meaning += " Their sum is 0." if one["sum_zero"] else ""
-            row = [f"`{one['name']}`", cell(one["unit"]), f"{number(one['min'])} to {number(one['max'])}", number(one["default"]),
+            row = [f"`{one['name']}`", cell(one["unit"]), f"{number(one['min'])}&nbsp;to&nbsp;{number(one['max'])}", number(one["default"]),
                    number(one["typical"]), cell(meaning)]
             lines.append(f"| {' | '.join(row)} |")
         lines.append("")
