@@ -14,6 +14,7 @@
 #include "client/cli/common.h"
 #include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/progress_bar.h"
 #include "client/cli/provenance.h"
 #include "client/cli/whole_number.h"
 #include "client/source/lease_keeper.h"
@@ -55,6 +56,7 @@ std::string Shown(absl::string_view text) {
 }
 
 int PrintError(absl::string_view message) {
+  ProgressBar::ClearShown();
   std::fflush(stdout);
   std::fprintf(stderr, "touchstone: error: %s\n", Shown(message).c_str());
   return kBadInput;
@@ -78,9 +80,9 @@ Cli::Cli()
   app_.set_version_flag("--version", absl::StrCat("touchstone ", kVersion), "The version");
   app_.require_subcommand(0, 1);
   app_.footer(
-      "Without --server the simulation runs in this process; with --server HOST:PORT a running "
-      "touchstone-server "
-      "does it. Both give the same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable, "
+      "Without --server the simulation runs in this process; with --server HOST:PORT, or "
+      "TOUCHSTONE_SERVER=HOST:PORT in the environment, a running touchstone-server does it. Both give the "
+      "same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable, "
       "4 refused or failed by the source, 130 interrupted.");
 }
 
@@ -209,6 +211,7 @@ absl::Status Cli::Write(const std::string& path, absl::string_view data) const {
 
 absl::Status Cli::Print(absl::string_view text) const {
   const std::string shown = Shown(text);
+  ProgressBar::ClearShown();
   std::fwrite(shown.data(), 1, shown.size(), stdout_taken_ ? stderr : stdout);
   return absl::OkStatus();
 }
@@ -229,11 +232,13 @@ void Cli::AddOutputOptions(CLI::App* command) {
 }
 
 void Cli::Log(absl::string_view line) const {
-  if (!output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
+  if (output_.quiet) return;
+  ProgressBar::ClearShown();
+  std::fprintf(stderr, "%s\n", Shown(line).c_str());
 }
 
 void Cli::Detail(absl::string_view line) const {
-  if (output_.verbose && !output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
+  if (output_.verbose) Log(line);
 }
 
 std::string Cli::HelpCommand() const {
@@ -310,8 +315,14 @@ int Cli::Run(int argc, char** argv) {
   // "rig-run": who holds a lease or stops a source is told with it.
   client::SetHolderProgram(
       absl::StrReplaceAll(HelpCommand().substr(std::strlen("touchstone ")), {{" ", "-"}}));
-  status = CheckFiles(app);
-  if (status.ok()) status = run->second();
+  status = ChooseServers(app);
+  if (status.ok()) status = CheckFiles(app);
+  if (status.ok()) {
+    // Of commands that show nothing better.
+    ProgressBar working(!output_.quiet);
+    working.ShowStage(HelpCommand());
+    status = run->second();
+  }
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
     if (status.ok()) status = absl::ResourceExhaustedError("stdout: the output could not be written whole");
   }

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "client/cli/progress_bar.h"
 #include "client/cli/terminal.h"
 #include "server/base/printable.h"
 #include "server/base/status.h"
@@ -192,6 +193,7 @@ std::string Counted(uint64_t count, const std::string& one, const std::string& m
 }
 
 void PrintJson(const Json& json) {
+  ProgressBar::ClearShown();
   std::printf("%s\n", EscapeInJson(json.dump(2, ' ', false, Json::error_handler_t::replace)).c_str());
 }
 

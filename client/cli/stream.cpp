@@ -222,6 +222,7 @@ absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_g
       source->Interrupt("interrupted at the command line");
       writer.Cancel();
     });
+    bar.ShowStage("reading what is there");
     status = writer.Run();
   }
   bar.Clear();

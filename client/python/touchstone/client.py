@@ -12,7 +12,7 @@ import numpy as np
 
 from . import checks, units
 from .batch import Batch
-from .connection import Connection, Targets
+from .connection import Connection, Targets, chosen_targets
 from .credentials import Credentials
 from .dataset import Dataset
 from .diagnosis import Diagnosis
@@ -41,8 +41,8 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
 
     Args:
-      targets: "host:port", several of them, or none: then a touchstone-server is started for this process, which ends
-        with client.close() or with the process.
+      targets: "host:port", or several of them. Default: TOUCHSTONE_SERVER. Without either, and for "none", a touchstone-server is
+        started for this process, which ends with client.close() or with the process.
       timeout_s: how long to wait for the first answer, of each target; SourceUnreachable after that.
       retry_for_s: how long a lost source is tried again, and the other targets with it, before
         SourceUnreachable is raised; counted from the last thing that arrived.
@@ -56,6 +56,7 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
       SourceUnreachable: none of them answers, or TLS or credentials do not fit; the message says which.
       InvalidRequest: a target is no "host:port".
     """
+    targets = chosen_targets(targets)
     if targets is None:
         own = OwnServer()
         # A source of our own asks for nothing, whatever the environment has for others.

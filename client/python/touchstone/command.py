@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import re
 import shutil
 import signal
 import sys
@@ -92,6 +93,19 @@ class CommandParser(argparse.ArgumentParser):
         missing = message.removeprefix("the following arguments are required: ")
         _complain(f"{message if missing == message else missing + ' is required'} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
+
+
+def whole_number(text: str) -> int:
+    """A count or a seed as the other commands read it (client/cli/whole_number.h): "1000", "1_000_000", "1e6"; from 0 to 2^64 - 1."""
+    match = re.fullmatch(r"(\d+(?:_\d+)*)(?:\.(\d+))?(?:[eE]\+?(\d+))?", text, re.ASCII)
+    fraction = (match[2] or "").rstrip("0") if match else ""
+    exponent = int(match[3] or 0) - len(fraction) if match else -1
+    if match is None or exponent < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 on; one like 1000, 1_000 or 1e3 was expected")
+    value = int(match[1] + fraction) * 10 ** min(exponent, 20)
+    if value >= 2**64:
+        raise argparse.ArgumentTypeError(f"'{text}' is too large; at most {2**64 - 1}")
+    return value
 
 
 def did_you_mean(word: str, known: list[str]) -> str:
