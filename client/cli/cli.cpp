@@ -27,7 +27,10 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr char kWholeNumber[] = "N";  // type of the options that are counts and seeds
+// Types of the options that are counts and seeds.
+bool IsWholeNumber(const CLI::Option* option) {
+  return option->get_type_name() == "N" || option->get_type_name() == "1-100";
+}
 
 std::vector<std::string> OptionNames(const CLI::App* app) {
   std::vector<std::string> names;
@@ -273,6 +276,9 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
   if (absl::ConsumePrefix(&what, "Could not convert: ")) {
     const std::pair<absl::string_view, absl::string_view> option =
         absl::StrSplit(what, absl::MaxSplits(" = ", 1));
+    const CLI::Option* named = app->get_option_no_throw(std::string(option.first));
+    if (named != nullptr && IsWholeNumber(named))
+      return PrintError(absl::StrCat(option.first, ": '", option.second, "' is too large", help));
     return PrintError(absl::StrCat(option.first, ": '", option.second,
                                    "' is not a number; one like 12.5 was expected, without a unit", help));
   }
@@ -286,7 +292,7 @@ int Cli::Run(int argc, char** argv) {
   for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
   for (const auto& [command, run] : runs_)
     for (CLI::Option* option : const_cast<CLI::App*>(command)->get_options())
-      if (option->get_type_name() == kWholeNumber) option->transform(CLI::Validator(CheckWholeNumber, ""));
+      if (IsWholeNumber(option)) option->transform(CLI::Validator(CheckWholeNumber, ""));
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -1,18 +1,44 @@
 #include "client/cli/help_format.h"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_split.h>
+
 #include "client/cli/common.h"
 #include "client/cli/terminal.h"
 
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kHelpColumn = 32;
+constexpr size_t kHelpColumn = 32, kNarrowHelpColumn = 26;  // where the texts of options begin
+constexpr size_t kBelowColumn = 6;  // on a narrow terminal, and of what follows a broken example
+constexpr size_t kNarrow = 100, kVeryNarrow = 70;
+
+// Texts of options stand under their names where a terminal has no room beside them.
+size_t HelpColumn() {
+  const size_t width = TextWidth();
+  return width < kVeryNarrow ? kBelowColumn : width < kNarrow ? kNarrowHelpColumn : kHelpColumn;
+}
+
+// An example and the remark behind it on a terminal that is too narrow for them: the command goes on after a backslash, so that
+// it can be copied, and the remark stands under it.
+std::string FittedExample(const std::string& line, size_t width) {
+  if (line.size() + 2 <= width) return "  " + line + "\n";
+  const size_t gap = line.find("   ");
+  const std::string remark(gap == std::string::npos
+                               ? absl::string_view()
+                               : absl::StripLeadingAsciiWhitespace(absl::string_view(line).substr(gap)));
+  std::string text;
+  const std::string command = Wrap(absl::string_view(line).substr(0, gap), width - 4, kBelowColumn - 2);
+  for (const absl::string_view part : absl::StrSplit(command, '\n'))
+    absl::StrAppend(&text, text.empty() ? "  " : " \\\n  ", part);
+  if (!remark.empty()) absl::StrAppend(&text, "\n", std::string(kBelowColumn, ' '), "# ", remark);
+  return text + "\n";
+}
 
 // One line of what it is, then examples, then usage and options.
 class HelpFormat : public CLI::Formatter {
  public:
-  explicit HelpFormat(std::string examples) : examples_(std::move(examples)) {
-    column_width(kHelpColumn);
+  explicit HelpFormat(std::vector<std::string> examples) : examples_(std::move(examples)) {
     label("OPTIONS", "OPTIONS");
     label("Positionals", "Arguments");
     label("Subcommands", "Commands");
@@ -21,7 +47,7 @@ class HelpFormat : public CLI::Formatter {
   }
 
   std::string make_description(const CLI::App* app) const override {
-    return absl::StrCat(Wrap(app->get_description(), TextWidth(), 0), "\n\nExamples:\n", examples_, "\n");
+    return absl::StrCat(Wrap(app->get_description(), TextWidth(), 0), "\n\nExamples:\n", Examples(), "\n");
   }
 
   std::string make_footer(const CLI::App* app) const override {
@@ -49,11 +75,12 @@ class HelpFormat : public CLI::Formatter {
 
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
     std::string left = "  " + make_option_name(option, is_positional) + make_option_opts(option);
-    if (left.size() + 2 > kHelpColumn)
-      left += "\n" + std::string(kHelpColumn, ' ');
+    const size_t column = HelpColumn();
+    if (left.size() + 2 > column)
+      left += "\n" + std::string(column, ' ');
     else
-      left.append(kHelpColumn - left.size(), ' ');
-    return left + Wrap(make_option_desc(option), TextWidth(), kHelpColumn) + "\n";
+      left.append(column - left.size(), ' ');
+    return left + Wrap(make_option_desc(option), TextWidth(), column) + "\n";
   }
 
   std::string make_option_opts(const CLI::Option* option) const override {
@@ -64,23 +91,22 @@ class HelpFormat : public CLI::Formatter {
   }
 
  private:
-  std::string examples_;
-};
-
-// "  touchstone objects" for each line of examples.
-std::string Indented(const std::string& lines) {
-  std::string text = "  ";
-  for (const char c : lines) {
-    text += c;
-    if (c == '\n') text += "  ";
+  // One per line; as they are where nobody sees them on a terminal.
+  std::string Examples() const {
+    std::string text;
+    for (const std::string& line : examples_)
+      absl::StrAppend(&text, OnTerminal() ? FittedExample(line, static_cast<size_t>(TerminalWidth()))
+                                          : "  " + line + "\n");
+    return text;
   }
-  return text + "\n";
-}
+
+  std::vector<std::string> examples_;
+};
 
 }  // namespace
 
 std::shared_ptr<CLI::FormatterBase> ExamplesFirst(const std::string& examples) {
-  return std::make_shared<HelpFormat>(Indented(examples));
+  return std::make_shared<HelpFormat>(absl::StrSplit(examples, '\n'));
 }
 
 }  // namespace touchstone::cli

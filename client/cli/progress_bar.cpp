@@ -59,7 +59,7 @@ std::string ProgressInPlace(const Progress& progress, double elapsed_s, size_t w
   std::vector<std::string> parts;
   if (progress.share >= 0) {
     const double share = std::clamp(progress.share, 0.0, 1.0);
-    const size_t bar = width < 80 ? kMinBarWidth : kBarWidth;
+    const size_t bar = width < kColumnsOfNoTerminal ? kMinBarWidth : kBarWidth;
     const auto filled = static_cast<size_t>(share * static_cast<double>(bar));
     parts.push_back(absl::StrFormat("[%s%s] %5.1f %%", std::string(filled, '#'),
                                     std::string(bar - filled, '.'), 100 * share));
@@ -142,10 +142,13 @@ void ProgressBar::Set(Progress progress) {
     progress.stage = absl::StrCat(part_, progress.stage.empty() ? "" : ", ", progress.stage);
     progress.share = part_from_ + (part_to_ - part_from_) * std::max(progress.share, 0.0);
   }
-  if (progress.left_s < 0 && progress.share >= 0) {
-    if (begun_at_ < 0) begun_at_ = progress.share;
-    progress.left_s =
-        SecondsLeft(progress.share, begun_at_, std::chrono::duration<double>(now - start_).count());
+  // While the share stays as it is, so does the moment at which the rest should be done.
+  const double elapsed_s = std::chrono::duration<double>(now - start_).count();
+  if (begun_at_ < 0) begun_at_ = progress.share;
+  if (progress.share != progress_.share) {
+    const double left_s =
+        progress.left_s >= 0 ? progress.left_s : SecondsLeft(progress.share, begun_at_, elapsed_s);
+    ends_at_s_ = left_s < 0 ? -1 : elapsed_s + left_s;
   }
   progress_ = std::move(progress);
   showing_ = true;
@@ -160,12 +163,14 @@ void ProgressBar::Set(Progress progress) {
 void ProgressBar::Draw(Clock::time_point now) {
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
   next_ = now + output_.interval;
+  Progress progress = progress_;
+  progress.left_s = ends_at_s_ > elapsed_s ? ends_at_s_ - elapsed_s : -1;
   if (output_.terminal) {
     std::fprintf(output_.file, "\r\x1b[K%s",
-                 ProgressInPlace(progress_, elapsed_s, ColumnsOf(output_.file)).c_str());
+                 ProgressInPlace(progress, elapsed_s, ColumnsOf(output_.file)).c_str());
     drawn_ = true;
   } else {
-    std::fprintf(output_.file, "%s\n", ProgressLine(progress_, elapsed_s).c_str());
+    std::fprintf(output_.file, "%s\n", ProgressLine(progress, elapsed_s).c_str());
   }
   std::fflush(output_.file);
 }

@@ -72,7 +72,8 @@ class ProgressBar {
   Progress progress_;
   std::string part_;
   double part_from_ = 0, part_to_ = 1;
-  double begun_at_ = -1;  // share of the first stage
+  double begun_at_ = -1;   // share of the first stage
+  double ends_at_s_ = -1;  // seconds since start_; below 0: unknown
   bool showing_ = false, drawn_ = false, ended_ = false;
   Clock::time_point next_;
   std::thread thread_;

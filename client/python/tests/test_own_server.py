@@ -122,5 +122,5 @@ def test_an_address_goes_before_the_variable(server, monkeypatch):
 
 def test_a_path_in_the_variable_is_refused_with_the_right_variable(server_program, monkeypatch):
     monkeypatch.setenv("TOUCHSTONE_SERVER", str(server_program))
-    with pytest.raises(touchstone.InvalidRequest, match="is a path.*TOUCHSTONE_SERVER_PROGRAM"):
+    with pytest.raises(touchstone.InvalidRequest, match=r"is a path.*TOUCHSTONE_SERVER_PROGRAM"):
         touchstone.connect()
