@@ -1,7 +1,10 @@
 #include "client/cli/help_format.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_split.h>
+
+#include <algorithm>
 
 #include "client/cli/common.h"
 #include "client/cli/terminal.h"
@@ -19,19 +22,40 @@ size_t HelpColumn() {
   return width < kVeryNarrow ? kBelowColumn : width < kNarrow ? kNarrowHelpColumn : kHelpColumn;
 }
 
+// The words of a command, each option with the value behind it; what is in quotes is whole.
+std::vector<std::string> UnbrokenWords(absl::string_view command) {
+  std::vector<std::string> words;
+  bool quoted = false, option = false;
+  for (const absl::string_view word : absl::StrSplit(command, ' ', absl::SkipEmpty())) {
+    const bool joins = quoted || (option && word[0] != '-');
+    if (joins)
+      absl::StrAppend(&words.back(), " ", word);
+    else
+      words.emplace_back(word);
+    option = !joins && word[0] == '-' && !absl::StrContains(word, "=");
+    if (std::count(word.begin(), word.end(), '\'') % 2 == 1) quoted = !quoted;
+  }
+  return words;
+}
+
 // An example and the remark behind it on a terminal that is too narrow for them: the command goes on after a backslash, so that
 // it can be copied, and the remark stands under it.
 std::string FittedExample(const std::string& line, size_t width) {
   if (line.size() + 2 <= width) return "  " + line + "\n";
   const size_t gap = line.find("   ");
-  const std::string remark(gap == std::string::npos
-                               ? absl::string_view()
-                               : absl::StripLeadingAsciiWhitespace(absl::string_view(line).substr(gap)));
-  std::string text;
-  const std::string command = Wrap(absl::string_view(line).substr(0, gap), width - 4, kBelowColumn - 2);
-  for (const absl::string_view part : absl::StrSplit(command, '\n'))
-    absl::StrAppend(&text, text.empty() ? "  " : " \\\n  ", part);
-  if (!remark.empty()) absl::StrAppend(&text, "\n", std::string(kBelowColumn, ' '), "# ", remark);
+  std::string text = " ";
+  size_t column = 1;
+  for (const std::string& word : UnbrokenWords(absl::string_view(line).substr(0, gap))) {
+    if (column > kBelowColumn && column + 1 + word.size() + 2 > width) {  // room for the backslash
+      absl::StrAppend(&text, " \\\n", std::string(kBelowColumn - 1, ' '));
+      column = kBelowColumn - 1;
+    }
+    absl::StrAppend(&text, " ", word);
+    column += 1 + word.size();
+  }
+  if (gap != std::string::npos)
+    absl::StrAppend(&text, "\n", std::string(kBelowColumn, ' '), "# ",
+                    absl::StripLeadingAsciiWhitespace(absl::string_view(line).substr(gap)));
   return text + "\n";
 }
 
@@ -75,6 +99,7 @@ class HelpFormat : public CLI::Formatter {
 
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
     std::string left = "  " + make_option_name(option, is_positional) + make_option_opts(option);
+    left.erase(left.find_last_not_of(' ') + 1);
     const size_t column = HelpColumn();
     if (left.size() + 2 > column)
       left += "\n" + std::string(column, ' ');
@@ -94,7 +119,19 @@ class HelpFormat : public CLI::Formatter {
   // One per line; as they are where nobody sees them on a terminal.
   std::string Examples() const {
     std::string text;
-    for (const std::string& line : examples_)
+    // An example of several lines is one command.
+    std::vector<std::string> examples;
+    bool goes_on = false;
+    for (const std::string& line : examples_) {
+      if (goes_on && OnTerminal()) {
+        examples.back().pop_back();
+        absl::StrAppend(&examples.back(), absl::StripLeadingAsciiWhitespace(line));
+      } else {
+        examples.push_back(line);
+      }
+      goes_on = absl::EndsWith(line, "\\");
+    }
+    for (const std::string& line : examples)
       absl::StrAppend(&text, OnTerminal() ? FittedExample(line, static_cast<size_t>(TerminalWidth()))
                                           : "  " + line + "\n");
     return text;

@@ -109,6 +109,7 @@ TEST(ProgressBar, WipesWhatItDrewBeforeOtherTextIsWritten) {
     bar.Show(10, 40, 10, "pictures");
     bar.Clear();
     std::fprintf(pipe.writer(), "note\n");
+    std::fflush(pipe.writer());
   }
   const std::string line = pipe.Line();
   EXPECT_THAT(line, HasSubstr("] 25.0 %  10 of 40 pictures"));
