@@ -4,10 +4,12 @@ import argparse
 import io
 import os
 import pty
+import sys
 
 import pytest
 
 from touchstone import command
+from touchstone.formats import __main__ as formats
 from touchstone.progress import Progress, left
 
 
@@ -78,3 +80,14 @@ def test_the_time_left_is_open_until_it_can_be_told():
     assert left(0.5, 0.1) == ""
     assert left(0.001, 20) == ""
     assert left(0.25, 20) == "1 min 0 s left"
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+@pytest.mark.parametrize("parser", [formats.export_parser, formats.import_parser, formats.verify_parser, formats.recover_parser])
+def test_help_is_as_wide_as_the_terminal(parser, columns, monkeypatch):
+    monkeypatch.setattr(command, "_columns", lambda: columns)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    lines = parser().format_help().split("\n")
+    assert max(map(len, lines)) <= columns
+    # An example that was broken goes on behind a backslash.
+    assert all(line.endswith(" \\") for line, after in zip(lines, lines[1:]) if line.startswith("  touchstone ") and after.startswith("     -"))

@@ -48,8 +48,7 @@ class _ExamplesFirst(argparse.HelpFormatter):
         # As wide as the texts of the other commands: from 60 to 110 columns. Texts begin at one column in every help.
         width = _columns()
         column = 6 if width < 70 else 26 if width < 100 else 32
-        # argparse leaves two columns free.
-        super().__init__(prog, max_help_position=column, width=min(110, width) + 2)
+        super().__init__(prog, max_help_position=column, width=min(110, width))
         self._action_max_length = column - 2
 
     def _format_action_invocation(self, action: argparse.Action) -> str:
