@@ -28,8 +28,8 @@ BAD_INPUT, UNREACHABLE, REFUSED, INTERRUPTED = 2, 3, 4, 130
 
 
 def _columns() -> int:
-    """Of standard output, at least 60; 110 where it is no terminal."""
-    return max(60, shutil.get_terminal_size((110, 24)).columns) if sys.stdout.isatty() else 110
+    """Of standard output, or what COLUMNS says; at least 60; 110 where it is no terminal."""
+    return max(60, shutil.get_terminal_size((110, 24)).columns)
 
 
 def _fitted(example: str, columns: int) -> str:
