@@ -16,6 +16,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/provenance.h"
+#include "client/cli/terminal.h"
 #include "client/cli/whole_number.h"
 #include "client/source/lease_keeper.h"
 #include "server/base/printable.h"
@@ -56,6 +57,14 @@ std::string CheckWholeNumber(std::string& text) {
 // What a server, a file or a person wrote, as it may stand on a terminal.
 std::string Shown(absl::string_view text) {
   return Printable(text, std::string::npos, /*keep_lines=*/true);
+}
+
+// The same with the styles that reports have on a terminal (client/report/text_layout.cpp).
+std::string ShownWithStyles(absl::string_view text) {
+  std::string shown = Shown(text);
+  for (const char* style : {"[0m", "[1m", "[2m", "[32m", "[33m", "[36m"})
+    absl::StrReplaceAll({{absl::StrCat("\\x1b", style), absl::StrCat("\x1b", style)}}, &shown);
+  return shown;
 }
 
 int PrintError(absl::string_view message) {
@@ -213,7 +222,7 @@ absl::Status Cli::Write(const std::string& path, absl::string_view data) const {
 }
 
 absl::Status Cli::Print(absl::string_view text) const {
-  const std::string shown = Shown(text);
+  const std::string shown = ColourOnStdout() ? ShownWithStyles(text) : Shown(text);
   ProgressBar::ClearShown();
   std::fwrite(shown.data(), 1, shown.size(), stdout_taken_ ? stderr : stdout);
   return absl::OkStatus();

@@ -138,6 +138,16 @@ TEST_F(HelpCommandTest, TheHelpOfEveryCommandIsAsWideAsTheTerminal) {
   }
 }
 
+TEST_F(HelpCommandTest, ReportsHaveTheirStylesOnATerminalAndNoneElsewhere) {
+  ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "2", "-o", "plan.csv"}).exit_code,
+            0);
+  ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "set.csv"}).exit_code, 0);
+  const std::string shown = AtTerminal(80, {"compare", Path("set.csv"), "-q"});
+  EXPECT_THAT(shown, HasSubstr("\x1b[1m"));
+  EXPECT_EQ(shown.find("\\x1b"), std::string::npos) << "as codes, not as text";
+  EXPECT_EQ(Run({"compare", "set.csv", "-q"}).out.find("\x1b"), std::string::npos);
+}
+
 TEST_F(HelpCommandTest, AnExampleThatIsTooWideCanStillBeCopied) {
   const std::string text = absl::StrReplaceAll(AtTerminal(80, {"help", "compare"}), {{"\r", ""}});
   EXPECT_THAT(text, HasSubstr("\n  touchstone compare set.csv --model nominal.yaml --model better.yaml \\\n"

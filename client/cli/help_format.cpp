@@ -74,6 +74,12 @@ class HelpFormat : public CLI::Formatter {
     return absl::StrCat(Wrap(app->get_description(), TextWidth(), 0), "\n\nExamples:\n", Examples(), "\n");
   }
 
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    std::string usage = CLI::Formatter::make_usage(app, std::move(name));
+    absl::StripAsciiWhitespace(&usage);
+    return Wrap(usage, TextWidth(), kBelowColumn) + "\n";
+  }
+
   std::string make_footer(const CLI::App* app) const override {
     const std::string footer = app->get_footer();
     return footer.empty() ? "" : Wrap(footer, TextWidth(), 0) + "\n";
@@ -110,7 +116,8 @@ class HelpFormat : public CLI::Formatter {
 
   std::string make_option_opts(const CLI::Option* option) const override {
     std::string text;
-    if (option->get_type_size() != 0) text += " " + option->get_type_name();
+    if (option->get_type_size() != 0 && !option->get_type_name().empty())
+      text += " " + option->get_type_name();
     if (option->get_required()) text += " (required)";
     return text;
   }

@@ -112,7 +112,7 @@ TEST(ProgressBar, WipesWhatItDrewBeforeOtherTextIsWritten) {
     std::fflush(pipe.writer());
   }
   const std::string line = pipe.Line();
-  EXPECT_THAT(line, HasSubstr("] 25.0 %  10 of 40 pictures"));
+  EXPECT_THAT(line, HasSubstr("]  25.0 %  10 of 40 pictures"));
   EXPECT_THAT(line, EndsWith("\r\x1b[Knote"));
 }
 
