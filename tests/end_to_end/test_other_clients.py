@@ -179,7 +179,13 @@ while receive.getActualTCPPose()[2] < before + 0.005:
     assert time.time() < until
 control.stopL(2.0)
 assert receive.getActualTCPPose()[2] < before + 0.04
+# speedL writes its command into registers and does not wait for the program to read it: a speedStop that is written
+# before the arm moves overwrites it, and the program of ur_rtde ends where it kills a thread that was never run.
+before = receive.getActualTCPPose()[2]
 assert control.speedL([0, 0, -0.01, 0, 0, 0], 0.5, 0.2)
+until = time.time() + 60
+while receive.getActualTCPPose()[2] > before - 0.001:
+    assert time.time() < until
 assert control.speedStop()
 # The slider is its own number.
 io = rtde_io.RTDEIOInterface(address)

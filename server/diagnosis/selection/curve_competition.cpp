@@ -13,9 +13,10 @@ namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kMaxCovariatesTried = 3;
-constexpr double kSimplerNats = 3;    // an effect must be worth this much beside a curve
-constexpr double kFormulaNats = 5;    // a formula this near says the same in fewer words
-constexpr double kMemoryNats = 10;    // a wander must be this much better than a curve and than one step
+constexpr double kSimplerNats = 3;  // an effect must be worth this much beside a curve
+constexpr double kFormulaNats = 5;  // a formula this near says the same in fewer words
+constexpr double kMemoryNats =
+    10;  // a wander must be this much better than a curve, than one step and than a period
 constexpr double kRougherNats = 3;    // ... and than a course without corners
 constexpr double kOvertakenNats = 3;  // a curve alone that is this much better takes a named effect's place
 
@@ -212,7 +213,9 @@ class Competition {
   absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<NoiseMemory> memory, MemoryOf(with.fit));
     if (!memory || !memory->everywhere ||
-        memory->gain_nats < std::max(with.curve.gain_nats, memory->step_gain_nats) + kMemoryNats ||
+        memory->gain_nats <
+            std::max({with.curve.gain_nats, memory->step_gain_nats, memory->period_gain_nats}) +
+                kMemoryNats ||
         memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
       return false;
     result_.fit = with.fit;

@@ -21,6 +21,7 @@
 #include "server/diagnosis/selection/surface_step.h"
 #include "server/diagnosis/selection/time_structure.h"
 #include "server/diagnosis/selection/touches_set_aside.h"
+#include "server/diagnosis/selection/uneven_scatter.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/ticks.h"
 #include "server/effects/all_effects.h"
@@ -113,8 +114,12 @@ class LadderBuilder {
     if (!selection_.memory && !doubts_.remounted && !selection_.partial)
       pose_scatter_ =
           FindPoseScatter(*workspace_.observations, ladder_.prediction, ladder_.residuals, selection_.noise);
-    if (!doubts_.remounted && !selection_.partial && !ladder_.noise_floor.is_rounding && !PlayRemains())
-      AddNoiseSteps(selection_.noise, selection_.memory.has_value(), &ladder_);
+    if (!doubts_.remounted && !selection_.partial && !ladder_.noise_floor.is_rounding && !PlayRemains()) {
+      touches::NoiseFindings noise = selection_.noise;
+      uneven_ = UnevenScatterOfNoise();
+      if (uneven_ && !uneven_->tails_remain) noise.degrees_of_freedom = {};
+      AddNoiseSteps(std::move(noise), selection_.memory.has_value(), &ladder_);
+    }
     QuestionNoise(steps);
     if (!selection_.memory && !doubts_.remounted) RemoveAbsentMemory(*workspace_.observations, &ladder_);
     TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -123,10 +128,10 @@ class LadderBuilder {
                                [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
                                  return SetErrors(workspace_, fit, candidate);
                                }));
-    const bool rest = StructureRemains() || selection_.curve || TimeStructureRemains() || Walks() ||
-                      selection_.partial || unplaced_ || doubts_.any() || ladder_.set_aside.is_finding ||
-                      ticks_.in_part() || selection_.group || PlayRemains();
-    if (has_formula() || rest) {
+    const bool rest = has_formula() || StructureRemains() || selection_.curve || TimeStructureRemains() ||
+                      Walks() || selection_.partial || unplaced_ || doubts_.any() ||
+                      ladder_.set_aside.is_finding || ticks_.in_part() || selection_.group || PlayRemains();
+    if (rest || uneven_) {
       TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
                                   DescribeUnexplained(workspace_, selection_, ladder_.final,
                                                       ladder_.noise_floor.sigma, with_formula_));
@@ -136,11 +141,14 @@ class LadderBuilder {
         ladder_.unexplained->covariates.insert(ladder_.unexplained->covariates.begin(),
                                                selection_.group->test);
       if (doubts_.remounted) NameRoundFirst(rounds_, &*ladder_.unexplained);
+      if (uneven_) NameUnevenScatter(*uneven_, rest, &*ladder_.unexplained);
       ladder_.unexplained->words = WordsOfRest();
-      engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), doubts_.any()), &ladder_.steps,
-                              &ladder_.candidates);
+      // An uneven scatter says nothing against effects, which move means.
+      if (rest)
+        engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), doubts_.any()), &ladder_.steps,
+                                &ladder_.candidates);
     }
-    ladder_.verdict = has_formula() || rest    ? engine::Verdict::kUnexplained
+    ladder_.verdict = rest || uneven_          ? engine::Verdict::kUnexplained
                       : !ladder_.steps.empty() ? engine::Verdict::kMissingEffects
                       : ladder_.values_wrong   ? engine::Verdict::kWrongValues
                                                : engine::Verdict::kAdequate;
@@ -315,6 +323,16 @@ class LadderBuilder {
     }
   }
 
+  // Where something else makes touches scatter, parts of the set scatter differently for that reason.
+  std::optional<UnevenScatter> UnevenScatterOfNoise() const {
+    const bool misfit =
+        has_formula() || StructureRemains() || unplaced_ || doubts_.any() || selection_.fit.hypothesis != 0;
+    if (selection_.memory || SharesTime(ladder_.noise_floor) || (!ladder_.noise_floor.from_repeats && misfit))
+      return std::nullopt;
+    return FindUnevenScatter(*workspace_.observations, ladder_.prediction, ladder_.residuals,
+                             selection_.noise);
+  }
+
   // Repeats scatter as no noise of the fingers does.
   bool PlayRemains() const { return pose_scatter_ && pose_scatter_->ahead; }
 
@@ -341,6 +359,7 @@ class LadderBuilder {
              "whose memory is as long as the session. Find what moves, or make a longer session.";
     const std::string words = unplaced_                      ? support_.WordsOfRest()
                               : doubts_.any()                ? doubts_.words
+                              : uneven_                      ? uneven_->words
                               : ladder_.set_aside.is_finding ? ladder_.set_aside.words
                               : ticks_.in_part()             ? TicksInWords()
                               : PlayRemains()                ? pose_scatter_->words
@@ -381,6 +400,7 @@ class LadderBuilder {
   RoundStructure rounds_;
   SurfaceSupport support_;
   std::optional<PoseScatter> pose_scatter_;
+  std::optional<UnevenScatter> uneven_;
   touches::TouchTicks ticks_;
   bool unplaced_ = false;  // a misfit repeats with the pose, but not with the place on the surface
   Ladder ladder_;

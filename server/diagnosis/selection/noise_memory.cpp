@@ -190,6 +190,38 @@ double StepGain(const Course& course) {
          std::log(n);
 }
 
+// A course that repeats at least three times, in steps of a quarter of a cycle over the whole session.
+double PeriodGain(const Course& course) {
+  constexpr int kPhases = 12, kMinCycles = 3;
+  const int n = course.touches(), channels = course.channels;
+  std::vector<double> at_s(n, 0.0);
+  double squares = 0;
+  for (int k = 1; k < n; ++k) at_s[k] = at_s[k - 1] + (std::isfinite(course.gap_s[k]) ? course.gap_s[k] : 0);
+  for (const double x : course.value) squares += x * x;
+  const double count = static_cast<double>(n) * channels, span_s = at_s.back();
+  double best = -INFINITY;
+  int tried = 0;
+  for (double cycles = kMinCycles; cycles <= n / 8.0; cycles += 0.25, ++tried) {
+    std::vector<double> sum(static_cast<size_t>(kPhases) * channels, 0.0);
+    double touches[kPhases] = {};
+    for (int k = 0; k < n; ++k) {
+      const double turns = cycles * at_s[k] / span_s;
+      const int phase = std::min(static_cast<int>(kPhases * (turns - std::floor(turns))), kPhases - 1);
+      touches[phase] += 1;
+      for (int c = 0; c < channels; ++c)
+        sum[static_cast<size_t>(phase) * channels + c] += course.value[static_cast<size_t>(k) * channels + c];
+    }
+    double explained = 0;
+    for (int phase = 0; phase < kPhases; ++phase)
+      for (int c = 0; c < channels && touches[phase] > 0; ++c) {
+        const double s = sum[static_cast<size_t>(phase) * channels + c];
+        explained += s * s / touches[phase];
+      }
+    best = std::max(best, -0.5 * count * std::log(std::max(1 - explained / squares, 1e-12)));
+  }
+  return tried > 0 ? best - 0.5 * kPhases * channels * std::log(count) - std::log(tried) : best;
+}
+
 struct BestWander {
   WanderLikelihood likelihood;
   double ratio = 1, time_s = 0;
@@ -244,6 +276,7 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   found.step_gain_nats = StepGain(course);
   found.smooth_gain_nats = FindBest(SmoothLikelihood, course, min_s, max_s).likelihood.log_likelihood -
                            Likelihood(course, 0, time_s).log_likelihood - std::log(count);
+  found.period_gain_nats = PeriodGain(course);
   found.white_s = {best.white_s, best.white_s / std::sqrt(2 * count), 0};
   found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};
   found.sigma_s.std_error = 0.5 * found.sigma_s.value * LogError(course, ratio, time_s, false);

@@ -49,6 +49,17 @@ TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
   EXPECT_TRUE(found->everywhere);
   EXPECT_GT(found->gain_nats, found->step_gain_nats + 20);
   EXPECT_GT(found->gain_nats, found->smooth_gain_nats + 3);
+  EXPECT_GT(found->gain_nats, found->period_gain_nats + 20);
+}
+
+TEST(NoiseMemory, ACourseWithCornersThatRepeatsIsNoWander) {
+  const CourseOfSession session(
+      5, [](int k, int i, RandomStream*) { return i == 0 ? 0.020 * std::fmod(10.0 * k, 600) / 600 : 0.0; });
+  const auto found = FindNoiseMemory(session.o, session.residuals);
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->gain_nats, found->smooth_gain_nats + 3)
+      << "its corners make it rougher than a smooth course";
+  EXPECT_GT(found->period_gain_nats, found->gain_nats + 20);
 }
 
 TEST(NoiseMemory, AWalkDoesNotForgetAndAWanderDoes) {

@@ -119,6 +119,7 @@ NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof, const D
   if (sample.groups.empty()) return found;
   NoiseSearch search(sample, declared, &found);
   search.Run();
+  found.model = search.best();
 
   // What the fit has followed of the noise is given back.
   double degrees_of_freedom = 0;

@@ -53,6 +53,7 @@ struct NoiseFindings {
   // By channel, s, of what its noise has beyond sigma_s, in quadrature: EffectRole::kNoiseByFinger. Empty: all alike.
   std::vector<NoiseEstimate> channel_sigma_s;
   bool channels_absent = false;
+  NoiseModel model;             // that describes the residuals best
   std::vector<int> outliers;    // indices of groups with a reading that no noise of the others explains
   std::vector<double> weights;  // by index: what a group should count for in a fit; empty: all the same
 };
