@@ -45,7 +45,8 @@ def pytest_configure(config):
         # Each worker has a core, and programs that it starts; threads of matrix products that wait for one another do not fit.
         os.environ.setdefault("OMP_NUM_THREADS", "1")
     # For programs that tests start, and for touchstone.connect() without an address.
-    os.environ.setdefault("TOUCHSTONE_SERVER", str(config.rootpath / "build/release/bin/touchstone-server"))
+    os.environ.setdefault("TOUCHSTONE_SERVER_PROGRAM", str(config.rootpath / "build/release/bin/touchstone-server"))
+    os.environ.pop("TOUCHSTONE_SERVER", None)
     # Tests talk to this machine; a test of a proxy sets its own.
     for name in ("http_proxy", "https_proxy", "grpc_proxy", "all_proxy"):
         os.environ.pop(name, None)

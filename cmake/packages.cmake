@@ -64,6 +64,12 @@ if(TOUCHSTONE_WHEEL)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS OFF)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3, python3-numpy, python3-grpcio, python3-protobuf")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS touchstone-server)
+  # As Debian's own packages of Python: what the interpreter keeps beside the files goes with them.
+  set(scripts ${CMAKE_CURRENT_BINARY_DIR}/packages/python)
+  file(WRITE ${scripts}/postinst "#!/bin/sh\nset -e\nif [ \"$1\" = configure ] && command -v py3compile > /dev/null; then py3compile -p python3-touchstone; fi\n")
+  file(WRITE ${scripts}/prerm "#!/bin/sh\nset -e\nif command -v py3clean > /dev/null; then py3clean -p python3-touchstone; fi\n")
+  file(CHMOD ${scripts}/postinst ${scripts}/prerm PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA "${scripts}/postinst;${scripts}/prerm")
   set(CPACK_COMPONENT_PYTHON_DESCRIPTION "touches and photographs of objects: client for Python")
 endif()
 # Each package says under which licence it is, where Debian looks.

@@ -26,7 +26,7 @@ absl::Status CheckBoardOptions(const Cli& cli, const ComparisonOptions& options,
   if (!options.html.empty())
     return absl::InvalidArgumentError(
         "--html: there is no page for pictures of a board; --json writes the report");
-  if (!cli.source().servers.empty())
+  if (!cli.source().servers.empty() && !cli.source().servers_from_environment)
     return absl::InvalidArgumentError(
         "--server: pictures of a board are diagnosed by this program; leave --server out");
   if (!cli.source().meshes.empty() || !cli.source().mesh_folder.empty())

@@ -4,6 +4,7 @@
 
 #include "client/cli/motion_options.h"
 #include "client/cli/plan_options.h"
+#include "client/cli/progress_bar.h"
 #include "client/cli/touch_options.h"
 #include "client/source/batch.h"
 #include "client/source/lab_units.h"
@@ -188,7 +189,9 @@ absl::Status RunCapture(const Cli& cli, const CaptureOptions& options) {
   }
   // One view per request: any number of views, and no large message.
   std::vector<std::string> written;
+  ProgressBar bar(!cli.output().quiet);
   for (int i = 0; i < views.size(); ++i) {
+    bar.Show(i, views.size(), i, "photographs");
     request.clear_views();
     *request.add_views() = views[i];
     request.set_first_index(i);

@@ -14,7 +14,9 @@
 #include "client/cli/common.h"
 #include "client/cli/help_format.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/progress_bar.h"
 #include "client/cli/provenance.h"
+#include "client/cli/terminal.h"
 #include "client/cli/whole_number.h"
 #include "client/source/lease_keeper.h"
 #include "server/base/printable.h"
@@ -26,7 +28,10 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr char kWholeNumber[] = "N";  // type of the options that are counts and seeds
+// Types of the options that are counts and seeds.
+bool IsWholeNumber(const CLI::Option* option) {
+  return option->get_type_name() == "N" || option->get_type_name() == "1-100";
+}
 
 std::vector<std::string> OptionNames(const CLI::App* app) {
   std::vector<std::string> names;
@@ -54,7 +59,16 @@ std::string Shown(absl::string_view text) {
   return Printable(text, std::string::npos, /*keep_lines=*/true);
 }
 
+// The same with the styles that reports have on a terminal (client/report/text_layout.cpp).
+std::string ShownWithStyles(absl::string_view text) {
+  std::string shown = Shown(text);
+  for (const char* style : {"[0m", "[1m", "[2m", "[32m", "[33m", "[36m"})
+    absl::StrReplaceAll({{absl::StrCat("\\x1b", style), absl::StrCat("\x1b", style)}}, &shown);
+  return shown;
+}
+
 int PrintError(absl::string_view message) {
+  ProgressBar::ClearShown();
   std::fflush(stdout);
   std::fprintf(stderr, "touchstone: error: %s\n", Shown(message).c_str());
   return kBadInput;
@@ -78,9 +92,9 @@ Cli::Cli()
   app_.set_version_flag("--version", absl::StrCat("touchstone ", kVersion), "The version");
   app_.require_subcommand(0, 1);
   app_.footer(
-      "Without --server the simulation runs in this process; with --server HOST:PORT a running "
-      "touchstone-server "
-      "does it. Both give the same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable, "
+      "Without --server the simulation runs in this process; with --server HOST:PORT, or "
+      "TOUCHSTONE_SERVER=HOST:PORT in the environment, a running touchstone-server does it. Both give the "
+      "same bytes. Exit codes: 0 done, 2 usage or bad input, 3 source unreachable, "
       "4 refused or failed by the source, 130 interrupted.");
 }
 
@@ -208,7 +222,8 @@ absl::Status Cli::Write(const std::string& path, absl::string_view data) const {
 }
 
 absl::Status Cli::Print(absl::string_view text) const {
-  const std::string shown = Shown(text);
+  const std::string shown = ColourOnStdout() ? ShownWithStyles(text) : Shown(text);
+  ProgressBar::ClearShown();
   std::fwrite(shown.data(), 1, shown.size(), stdout_taken_ ? stderr : stdout);
   return absl::OkStatus();
 }
@@ -229,11 +244,13 @@ void Cli::AddOutputOptions(CLI::App* command) {
 }
 
 void Cli::Log(absl::string_view line) const {
-  if (!output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
+  if (output_.quiet) return;
+  ProgressBar::ClearShown();
+  std::fprintf(stderr, "%s\n", Shown(line).c_str());
 }
 
 void Cli::Detail(absl::string_view line) const {
-  if (output_.verbose && !output_.quiet) std::fprintf(stderr, "%s\n", Shown(line).c_str());
+  if (output_.verbose) Log(line);
 }
 
 std::string Cli::HelpCommand() const {
@@ -268,6 +285,9 @@ int Cli::UsageError(const CLI::ParseError& error, int argc, char** argv) {
   if (absl::ConsumePrefix(&what, "Could not convert: ")) {
     const std::pair<absl::string_view, absl::string_view> option =
         absl::StrSplit(what, absl::MaxSplits(" = ", 1));
+    const CLI::Option* named = app->get_option_no_throw(std::string(option.first));
+    if (named != nullptr && IsWholeNumber(named))
+      return PrintError(absl::StrCat(option.first, ": '", option.second, "' is too large", help));
     return PrintError(absl::StrCat(option.first, ": '", option.second,
                                    "' is not a number; one like 12.5 was expected, without a unit", help));
   }
@@ -281,7 +301,7 @@ int Cli::Run(int argc, char** argv) {
   for (const auto& [command, run] : runs_) AddOutputOptions(const_cast<CLI::App*>(command));
   for (const auto& [command, run] : runs_)
     for (CLI::Option* option : const_cast<CLI::App*>(command)->get_options())
-      if (option->get_type_name() == kWholeNumber) option->transform(CLI::Validator(CheckWholeNumber, ""));
+      if (IsWholeNumber(option)) option->transform(CLI::Validator(CheckWholeNumber, ""));
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -310,8 +330,14 @@ int Cli::Run(int argc, char** argv) {
   // "rig-run": who holds a lease or stops a source is told with it.
   client::SetHolderProgram(
       absl::StrReplaceAll(HelpCommand().substr(std::strlen("touchstone ")), {{" ", "-"}}));
-  status = CheckFiles(app);
-  if (status.ok()) status = run->second();
+  status = ChooseServers(app);
+  if (status.ok()) status = CheckFiles(app);
+  if (status.ok()) {
+    // Of commands that show nothing better.
+    ProgressBar working(!output_.quiet);
+    working.ShowStage(HelpCommand());
+    status = run->second();
+  }
   if (std::fflush(stdout) != 0 || std::ferror(stdout)) {
     if (status.ok()) status = absl::ResourceExhaustedError("stdout: the output could not be written whole");
   }

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "client/cli/progress_bar.h"
 #include "client/cli/terminal.h"
 #include "server/base/printable.h"
 #include "server/base/status.h"
@@ -165,7 +166,18 @@ std::vector<size_t> Table::Widths() const {
 std::string Wrap(absl::string_view text, size_t width, size_t indent) {
   std::string result;
   size_t column = indent;
-  for (const absl::string_view word : absl::StrSplit(text, ' ', absl::SkipEmpty())) {
+  std::vector<absl::string_view> words = absl::StrSplit(text, ' ', absl::SkipEmpty());
+  for (size_t k = 0; k < words.size(); ++k) {
+    // A word that no line has room for is broken behind a comma or a bar.
+    if (indent + words[k].size() > width) {
+      const size_t room = width - std::min(width, indent);
+      if (const size_t at = words[k].substr(0, room).find_last_of(",|"); at != absl::string_view::npos) {
+        const absl::string_view rest = words[k].substr(at + 1);
+        words[k] = words[k].substr(0, at + 1);
+        words.insert(words.begin() + static_cast<std::ptrdiff_t>(k) + 1, rest);
+      }
+    }
+    const absl::string_view word = words[k];
     if (column > indent && column + 1 + word.size() > width) {
       absl::StrAppend(&result, "\n", std::string(indent, ' '));
       column = indent;
@@ -192,6 +204,7 @@ std::string Counted(uint64_t count, const std::string& one, const std::string& m
 }
 
 void PrintJson(const Json& json) {
+  ProgressBar::ClearShown();
   std::printf("%s\n", EscapeInJson(json.dump(2, ' ', false, Json::error_handler_t::replace)).c_str());
 }
 

@@ -32,7 +32,8 @@ struct OutputOptions {
 // Where touches come from: servers, or a source in this process with these meshes and this renderer.
 struct SourceOptions {
   std::vector<std::string> servers;
-  client::Credentials credentials;  // what those servers are shown
+  bool servers_from_environment = false;  // TOUCHSTONE_SERVER names them
+  client::Credentials credentials;        // what those servers are shown
   std::vector<std::string> meshes;
   std::string mesh_folder;
   double wait_s = 10;  // for a server that is starting
@@ -129,6 +130,10 @@ class Cli {
                            const std::string& text, OutputKind kind, bool json_is_a_format);
   void AddOutputOptions(CLI::App* command);
   void AddServerOptions(CLI::App* command, const std::string& what);
+  // After parsing: TOUCHSTONE_SERVER where --server was left out, and none of them after --server none.
+  absl::Status ChooseServers(const CLI::App* command);
+  // What is wrong with an option that only a simulation in this process has.
+  absl::Status EmbeddedOnly(absl::string_view option) const;
   void AddCredentialOptions(CLI::App* command);
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
@@ -179,7 +184,8 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-// Text broken into lines of at most `width` columns, all but the first indented.
+// Text broken into lines of at most `width` columns, all but the first indented. Words stay whole, but for one that a line has
+// no room for.
 std::string Wrap(absl::string_view text, size_t width, size_t indent);
 
 // Four significant digits, for people: "0.05", "149.9", "1.2e-06", "21860".

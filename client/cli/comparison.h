@@ -73,7 +73,13 @@ class Comparison {
   // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it. A lost server
   // is replaced by the next one, which begins anew.
   template <typename Response, typename Start>
-  absl::StatusOr<v1::Report> Run(const Start& start);
+  absl::StatusOr<v1::Report> Run(const Start& start) {
+    ProgressBar bar(!cli_.output().quiet);
+    return Run<Response>(start, &bar);
+  }
+  // The same on a bar that shows more than this call.
+  template <typename Response, typename Start>
+  absl::StatusOr<v1::Report> Run(const Start& start, ProgressBar* bar);
 
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
@@ -103,6 +109,7 @@ absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const
 
 template <typename Response, typename Start>
 absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* bar) {
+  bar->ShowStage("sending the measurements", 0);
   TOUCHSTONE_RETURN_IF_ERROR(SendAheadNow());
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
@@ -127,11 +134,10 @@ absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* 
 }
 
 template <typename Response, typename Start>
-absl::StatusOr<v1::Report> Comparison::Run(const Start& start) {
-  ProgressBar bar(!cli_.output().quiet);
+absl::StatusOr<v1::Report> Comparison::Run(const Start& start, ProgressBar* bar) {
   absl::StatusOr<v1::Report> report;
   TOUCHSTONE_RETURN_IF_ERROR(connection_->Retrying([&] {
-    report = Attempt<Response>(start, &bar);
+    report = Attempt<Response>(start, bar);
     return report.status();
   }));
   AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &*report);

@@ -2,6 +2,7 @@
 // model is found, added, and shown.
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 
 #include <absl/strings/str_format.h>
@@ -34,6 +35,7 @@ class Demo {
   Demo(const Cli& cli, const DemoFlags& flags) : cli_(cli), flags_(flags) {}
 
   absl::Status Run() {
+    ::unsetenv("TOUCHSTONE_SERVER");          // it brings its own programs
     const Interrupt::Handler handler([] {});  // those who wait for programs look whether it was raised
     TOUCHSTONE_RETURN_IF_ERROR(MakeFolder());
     TOUCHSTONE_RETURN_IF_ERROR(Touch());

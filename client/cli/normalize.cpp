@@ -145,7 +145,7 @@ class NormalizeRun {
     ProgressBar bar(!cli_.output().quiet);
     for (const NormalizeJob& job : jobs) {
       if (Interrupt::Raised()) return absl::CancelledError("interrupted");
-      bar.Show(done_, jobs.size(), done_);
+      bar.Show(done_, jobs.size(), done_, "photographs");
       const std::string path = (fs::path(options_.folder) / job.file).string();
       TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image picture, ReadPicture(path));
       TOUCHSTONE_ASSIGN_OR_RETURN(const image::Image normalized, NormalizeOne(picture, path));
@@ -167,7 +167,7 @@ class NormalizeRun {
     std::map<std::string, std::string> masks;
     for (size_t k = 0; k < set.size(); ++k) {
       if (Interrupt::Raised()) return absl::CancelledError("interrupted");
-      bar.Show(done_, set.size(), done_);
+      bar.Show(done_, set.size(), done_, "photographs");
       const session::PhotographRow& row = set.photographs[k];
       image::Image picture;
       picture.width = set.camera.width_px, picture.height = set.camera.height_px,

@@ -16,6 +16,7 @@
 #include <random>
 #include <utility>
 
+#include "client/cli/progress_bar.h"
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 
@@ -267,6 +268,7 @@ absl::Status CheckOutputFiles(const std::vector<OutputFile>& outputs, const std:
 absl::Status WriteOutputFile(const std::string& path, absl::string_view data, bool force,
                              std::optional<mode_t> bits) {
   if (path.empty() || IsStandardOutput(path)) {
+    ProgressBar::ClearShown();
     ::fwrite(data.data(), 1, data.size(), stdout);  // Cli::Run reports what went wrong with it
     return absl::OkStatus();
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "client/cli/plan_options.h"
+#include "client/cli/progress_bar.h"
 #include "client/source/lab_units.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
@@ -54,16 +55,20 @@ std::vector<Rejection> RejectionsOf(const v1::PlanDraws& draws) {
           {"steep_incidence", "a finger met the surface too obliquely", draws.steep_incidence()}};
 }
 
-absl::StatusOr<PlannedTouches> Expand(client::Connection* connection, const PlanCommandOptions& options,
-                                      uint64_t count, v1::ExpandPlanRequest request) {
+absl::StatusOr<PlannedTouches> Expand(const Cli& cli, client::Connection* connection,
+                                      const PlanCommandOptions& options, uint64_t count,
+                                      v1::ExpandPlanRequest request) {
   PlannedTouches planned;
-  for (const std::string& object : SplitCommas(options.objects)) {
+  const std::vector<std::string> objects = SplitCommas(options.objects);
+  ProgressBar bar(!cli.output().quiet);
+  for (const std::string& object : objects) {
     request.set_object(object);
     v1::PlanDraws draws;
     for (uint64_t done = 0; done < count;) {
       const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
       request.set_first_index(options.first + done);
       request.set_count(step);
+      bar.Show(planned.touches.size(), count * objects.size(), planned.touches.size(), "touches");
       TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ExpandPlanResponse response,
                                   connection->Call(&v1::Source::Stub::ExpandPlan, request));
       for (const v1::CommandedTouch& touch : response.touches()) {
@@ -142,7 +147,7 @@ absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool cou
   if (!count_given && request.plan().has_list()) count = request.plan().list().touches_size();
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
   TOUCHSTONE_ASSIGN_OR_RETURN(const PlannedTouches planned,
-                              Expand(connection.get(), options, count, std::move(request)));
+                              Expand(cli, connection.get(), options, count, std::move(request)));
   LogDraws(cli, planned);
   const std::string details = absl::StrCat(" (", Counted(planned.touches.size(), "touch", "touches"), ")");
   if (!cli.output().json) {

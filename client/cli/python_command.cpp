@@ -101,7 +101,8 @@ absl::Status BecomePythonCommand(const PythonCommand& command, const std::vector
   ::setenv("TOUCHSTONE_PROGRAM", PathBesideThisProgram("touchstone").c_str(), /*overwrite=*/1);
   // A module that starts a server takes the one of this program.
   const std::string server = PathBesideThisProgram("touchstone-server");
-  if (::access(server.c_str(), X_OK) == 0) ::setenv("TOUCHSTONE_SERVER", server.c_str(), /*replace=*/0);
+  if (::access(server.c_str(), X_OK) == 0)
+    ::setenv("TOUCHSTONE_SERVER_PROGRAM", server.c_str(), /*replace=*/0);
   std::fflush(stdout);
   ::execv(raw[0], raw.data());
   return absl::NotFoundError(absl::StrCat(*python, " cannot be started: ", std::strerror(errno)));

@@ -45,12 +45,12 @@ TEST_F(PythonCommandTest, TheModuleGetsEveryWord) {
 }
 
 TEST_F(PythonCommandTest, TheModuleFindsTheServerOfThisProgram) {
-  Module("import os\nprint(os.environ.get('TOUCHSTONE_SERVER'))\n");
-  ::unsetenv("TOUCHSTONE_SERVER");
+  Module("import os\nprint(os.environ.get('TOUCHSTONE_SERVER_PROGRAM'))\n");
+  ::unsetenv("TOUCHSTONE_SERVER_PROGRAM");
   EXPECT_THAT(Run({"export"}).out, ::testing::EndsWith("/bin/touchstone-server\n"));
-  ::setenv("TOUCHSTONE_SERVER", "/another/server", 1);
+  ::setenv("TOUCHSTONE_SERVER_PROGRAM", "/another/server", 1);
   EXPECT_EQ(Run({"export"}).out, "/another/server\n");
-  ::unsetenv("TOUCHSTONE_SERVER");
+  ::unsetenv("TOUCHSTONE_SERVER_PROGRAM");
 }
 
 TEST_F(PythonCommandTest, HelpIsThatOfTheModule) {

@@ -30,12 +30,19 @@ class RealBinaryTest : public ::testing::Test {
  protected:
   std::string Path(const std::string& name) const { return folder_.Path(name); }
 
+  // TOUCHSTONE_SERVER of what is started from now on; empty: it is not set.
+  void SetServerVariable(const std::string& value) { server_variable_ = value; }
+
   // Starts touchstone in the test's folder, its output in files.
   pid_t Start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(),
                      std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone");
     const pid_t child = ::fork();
     if (child != 0) return child;
+    if (server_variable_.empty())
+      ::unsetenv("TOUCHSTONE_SERVER");
+    else
+      ::setenv("TOUCHSTONE_SERVER", server_variable_.c_str(), 1);
     if (::chdir(folder_.path().c_str()) != 0) ::_exit(99);
     for (const auto& [descriptor, name] : {std::pair{1, ".out"}, std::pair{2, ".err"}}) {
       const int file = ::open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
@@ -94,6 +101,7 @@ class RealBinaryTest : public ::testing::Test {
 
  private:
   TestFolder folder_;
+  std::string server_variable_;
 };
 
 }  // namespace touchstone::cli

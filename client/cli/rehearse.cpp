@@ -214,23 +214,30 @@ class Rehearsal {
     };
     const size_t wanted = options_.sets > 0 ? options_.sets : SIZE_MAX;
     ProgressBar bar(!cli_.output().quiet);
-    for (size_t n = state_.sets().size(); n < wanted && (options_.sets > 0 || minutes() < options_.minutes);
-         ++n) {
+    const size_t first = state_.sets().size();
+    for (size_t n = first; n < wanted && (options_.sets > 0 || minutes() < options_.minutes); ++n) {
       const RehearsedCase& hidden = cases_[n % cases_.size()];
-      bar.ShowStage(
-          absl::StrCat("set ", n + 1, ": ", hidden.name),
-          options_.sets > 0 ? static_cast<double>(n) / options_.sets : minutes() / options_.minutes);
+      // Of a time that was given, a set is as large a share as those before it were.
+      const double sets = options_.sets > 0 ? options_.sets : 0;
+      const double share = sets > 0 ? static_cast<double>(n) / sets : minutes() / options_.minutes;
+      const double made = static_cast<double>(n - first);
+      const double next = sets > 0 ? (static_cast<double>(n) + 1) / sets
+                                   : std::min(1.0, made > 0 ? share * (made + 1) / made : share);
+      bar.SetPart(absl::StrCat("set ", n + 1, ", ", hidden.name, " hidden"), share, next);
+      bar.ShowStage("touching");
       v1::DiagnoseRequest request;
       *request.mutable_evidence() = comparison_->evidence();
       request.mutable_evidence()->set_seed(options_.seed + n);
       TOUCHSTONE_ASSIGN_OR_RETURN(
           *request.mutable_evidence()->mutable_csv(),
           TouchPlan(plan_, hidden, options_.seed + 1 + n, &comparison_->connection()));
-      bar.Clear();
       TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                                  comparison_->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-                                    return comparison_->connection().diagnosis().Diagnose(context, request);
-                                  }));
+                                  comparison_->Run<v1::DiagnoseResponse>(
+                                      [&](grpc::ClientContext* context) {
+                                        return comparison_->connection().diagnosis().Diagnose(context,
+                                                                                              request);
+                                      },
+                                      &bar));
       TOUCHSTONE_RETURN_IF_ERROR(state_.Add(Assess(hidden, report)));
     }
     return absl::OkStatus();

@@ -13,6 +13,7 @@
 #include "client/cli/session_fix.h"
 #include "client/cli/session_images.h"
 #include "client/cli/session_trash.h"
+#include "client/cli/session_verify.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -404,6 +405,8 @@ void AddSession(Cli* cli) {
   cli->AddSourceOptions(in);
   in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
       ->type_name("NAME");
+
+  AddSessionVerify(cli, group);
 
   AddSessionFix(cli, group);
 

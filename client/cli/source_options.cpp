@@ -1,4 +1,5 @@
 // The options that say where touches come from, and the connection that they name.
+#include <cstdlib>
 #include <map>
 
 #include "client/cli/common.h"
@@ -11,13 +12,41 @@ namespace {
 
 constexpr char kGroup[] = "Source";
 constexpr double kMaxWaitS = 3600;
-
-absl::Status EmbeddedOnly(absl::string_view option) {
-  return absl::InvalidArgumentError(absl::StrCat(
-      option, ": works only without --server; give it to touchstone-server instead (the same option there)"));
-}
+constexpr char kServerVariable[] = "TOUCHSTONE_SERVER";  // addresses, as --server takes them
+constexpr char kNoServer[] = "none";                     // of --server, against the variable
 
 }  // namespace
+
+absl::Status Cli::EmbeddedOnly(absl::string_view option) const {
+  return absl::InvalidArgumentError(
+      source_.servers_from_environment
+          ? absl::StrCat(option, ": works only in this process, and ", kServerVariable,
+                         " names a server; add --server ", kNoServer,
+                         ", or give it to touchstone-server instead (the same option there)")
+          : absl::StrCat(option,
+                         ": works only without --server; give it to touchstone-server instead (the same "
+                         "option there)"));
+}
+
+absl::Status Cli::ChooseServers(const CLI::App* command) {
+  const CLI::Option* option = command->get_option_no_throw("--server");
+  if (option == nullptr) return absl::OkStatus();
+  if (source_.servers == std::vector<std::string>{kNoServer}) {
+    source_.servers.clear();
+    return absl::OkStatus();
+  }
+  const char* const named = std::getenv(kServerVariable);
+  if (option->count() > 0 || named == nullptr || *named == '\0' || absl::string_view(named) == kNoServer)
+    return absl::OkStatus();
+  if (*named == '/' || *named == '.')
+    return absl::InvalidArgumentError(
+        absl::StrCat(kServerVariable, ": '", named,
+                     "' is a path; HOST:PORT was expected (TOUCHSTONE_SERVER_PROGRAM names the program that "
+                     "Python starts)"));
+  source_.servers = {named};
+  source_.servers_from_environment = true;
+  return absl::OkStatus();
+}
 
 void Cli::AddServerOptions(CLI::App* command, const std::string& what) {
   command->add_option("--server", source_.servers, what)
@@ -48,13 +77,13 @@ void Cli::AddCredentialOptions(CLI::App* command) {
 }
 
 void Cli::AddRigOptions(CLI::App* command) {
-  AddServerOptions(command, "The touchstone-gateway that works the rig");
+  AddServerOptions(command, "The touchstone-gateway that works the rig. Default: TOUCHSTONE_SERVER");
 }
 
 void Cli::AddSourceOptions(CLI::App* command) {
   AddServerOptions(command,
-                   "A touchstone-server, or several with commas (the next one takes over from a lost one). "
-                   "Default: simulate in this process");
+                   "A touchstone-server, or several with commas (the next one takes over from a lost one); "
+                   "none: simulate in this process. Default: TOUCHSTONE_SERVER, else none");
   const auto add = [&](const std::string& name, auto& value, const std::string& type,
                        const std::string& text) {
     return command->add_option(name, value, text)->type_name(type)->group(kGroup);
@@ -113,7 +142,12 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     options.credentials = client::WithEnvironment(source_.credentials);
     options.wait_s = source_.wait_s;
     options.log = [this](const std::string& line) { Log(line); };
-    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
+    absl::StatusOr<std::unique_ptr<client::Connection>> opened = client::Connection::Open(std::move(options));
+    if (!opened.ok() && source_.servers_from_environment)
+      return absl::Status(opened.status().code(),
+                          absl::StrCat(opened.status().message(), " (", kServerVariable,
+                                       " names it; --server ", kNoServer, ": in this process)"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, std::move(opened));
     const std::string proxy = service::ProxyFor(connection->address());
     Detail(absl::StrCat("connected to ", connection->address(), proxy.empty() ? "" : " through ", proxy));
     return connection;

@@ -244,6 +244,7 @@ absl::Status RunStream(const Cli& cli, const StreamOptions& o, bool shard_size_g
       source->Interrupt("interrupted at the command line");
       writer.Cancel();
     });
+    bar.ShowStage("reading what is there");
     status = writer.Run();
   }
   bar.Clear();
@@ -328,7 +329,8 @@ void AddStream(Cli* cli) {
   const auto* to =
       add("--to", options->format, "FORMAT",
           "webdataset: tar files; folder: touches.csv and images; hdf5. Default: webdataset", files);
-  *shard_size = add("--shard-size", options->shard_size, "N", "Samples per shard. Default: 10000", files);
+  *shard_size = add("--shard-size", options->shard_size, "N",
+                    "Samples per shard: what an interruption loses at most. Default: 10000", files);
   CLI::Option* shards =
       add("--shards", options->shards, "K/N",
           "Write only shards K, K + N, ...: the part of job K of N that share the folder. Default: 0/1, all",

@@ -22,8 +22,12 @@ size_t TextWidth() {
   return static_cast<size_t>(std::min(TerminalWidth(), kMaxTextWidth));
 }
 
+bool OnTerminal() {
+  return ::isatty(STDOUT_FILENO) != 0;
+}
+
 bool ColourOnStdout() {
-  return ::isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
+  return OnTerminal() && std::getenv("NO_COLOR") == nullptr;
 }
 
 }  // namespace touchstone::cli

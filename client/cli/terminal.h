@@ -11,6 +11,9 @@ int TerminalWidth();
 // The same for text, whose lines are at most 110 columns.
 size_t TextWidth();
 
+// Whether standard output is a terminal.
+bool OnTerminal();
+
 // Whether standard output is a terminal that takes colours (NO_COLOR is not set).
 bool ColourOnStdout();
 

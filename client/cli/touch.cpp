@@ -112,9 +112,8 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
                                   ? client::NewTouchId(row.measured.touch)
                                   : client::TouchId(session, row.measured.object, row.planned));
     }
-    if (source->physical())
-      bar.ShowStage(absl::StrCat("touch ", first + 1, " of ", rows->size(), ": ", request.object()),
-                    static_cast<double>(first) / rows->size());
+    bar.ShowStage(absl::StrCat("touch ", first + 1, " of ", rows->size(), ": ", request.object()),
+                  static_cast<double>(first) / static_cast<double>(rows->size()));
     absl::StatusOr<v1::TouchResponse> response = source->Touch(std::move(request));
     if (!response.ok()) {
       bar.Clear();

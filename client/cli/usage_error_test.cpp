@@ -133,5 +133,25 @@ TEST_F(UsageErrorTest, ARigIsMissedByTheNameOfItsProgram) {
   EXPECT_THAT(outcome.err, HasSubstr("touchstone-gateway"));
 }
 
+TEST_F(UsageErrorTest, CountsAndSeedsAreWholeNumbersOfAnyFormButNoOther) {
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"stream", "--samples", "-1", "--out", "x"}, "'-1' is no whole number"},
+      {{"stream", "--samples", "1.5", "--out", "x"}, "'1.5' is no whole number"},
+      {{"stream", "--seed", "18446744073709551616", "--out", "x"}, "is too large"},
+      {{"touch", "lat20", "--approach", "0,0,-1", "--seed=-7"}, "'-7' is no whole number"},
+      {{"plan", "lat20", "--count", "5e9", "-o", "x.csv"}, "--count: '5000000000' is too large"},
+      {{"touch", "lat20", "--approach", "0,0,-1", "--threads", "5e9"},
+       "--threads: '5000000000' is too large"},
+      {{"capture", "lat20", "--eye-mm", "300,0,80", "--jpeg-quality", "1e30", "-o", "x.jpg"}, "is too large"},
+  };
+  for (const auto& [arguments, words] : cases) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << words << ": " << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  }
+  EXPECT_EQ(Run({"touch", "lat20", "--approach", "0,0,-1", "--seed", "1e6", "-q"}).out,
+            Run({"touch", "lat20", "--approach", "0,0,-1", "--seed", "1_000_000", "-q"}).out);
+}
+
 }  // namespace
 }  // namespace touchstone::cli

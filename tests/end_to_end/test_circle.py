@@ -20,7 +20,7 @@ import time
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", ROOT / "build/release/bin/touchstone-server")).parent
+BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM", ROOT / "build/release/bin/touchstone-server")).parent
 EXAMPLE = ROOT / "client/python/examples/rig_run.py"
 
 # Simulated seconds in one second. A touch takes five of them; what is left is our own programs' time.

@@ -12,7 +12,7 @@ import pytest
 
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 MONITORING = REPOSITORY / "deploy/monitoring"
-PROGRAM = os.environ.get("TOUCHSTONE_SERVER") or REPOSITORY / "build/release/bin/touchstone-server"
+PROGRAM = os.environ.get("TOUCHSTONE_SERVER_PROGRAM") or REPOSITORY / "build/release/bin/touchstone-server"
 SERIES = re.compile(r"\b(?:touchstone|grpc_server)_[a-z_]+\b")
 
 

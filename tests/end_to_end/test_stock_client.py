@@ -16,7 +16,7 @@ except ImportError:
     GetMessageClass = MessageFactory().GetPrototype  # type: ignore[attr-defined]  # of protobuf before 4.22
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SERVER = os.environ.get("TOUCHSTONE_SERVER", str(ROOT / "build/release/bin/touchstone-server"))
+SERVER = os.environ.get("TOUCHSTONE_SERVER_PROGRAM", str(ROOT / "build/release/bin/touchstone-server"))
 GRPC_PROTO = pathlib.Path("/usr/share/grpc-proto")
 
 

@@ -19,7 +19,7 @@ import grpc
 from touchstone.v1 import models_pb2, sessions_pb2, source_pb2
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SERVER = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or ROOT / "build/release/bin/touchstone-server")
+SERVER = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM") or ROOT / "build/release/bin/touchstone-server")
 GATEWAY, EMULATOR = SERVER.parent / "touchstone-gateway", SERVER.parent / "touchstone-rig-emulator"
 CLIENT = SERVER.parent / "touchstone"
 # Five supershapes that take a moment to build: what is tried here does not depend on their size.

@@ -136,7 +136,7 @@ class PythonFile:
     def _run(self, words, mutant, reached, second, limit):
         command = [self._tree.python, "-m", "pytest", "-p", "no:cacheprovider", "-q", "-rfE", *words]
         command += [word for test in self.broken for word in ("--deselect", test)] + (["-m", "second_tier"] if second else [])
-        more = {"TOUCHSTONE_SERVER": str(self._tree.bin / "touchstone-server")}
+        more = {"TOUCHSTONE_SERVER_PROGRAM": str(self._tree.bin / "touchstone-server")}
         return processes.run(command, self._tree.root, processes.environment(mutant, reached, second, more), limit)
 
     def learn(self, name, reached):

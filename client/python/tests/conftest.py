@@ -1,4 +1,4 @@
-"""Real servers for the tests. TOUCHSTONE_SERVER names the program; default build/release/bin/touchstone-server."""
+"""Real servers for the tests. TOUCHSTONE_SERVER_PROGRAM names the program; default build/release/bin/touchstone-server."""
 
 import os
 import pathlib
@@ -66,9 +66,9 @@ class Server:
 
 @pytest.fixture(scope="session")
 def server_program():
-    program = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or _REPOSITORY / "build/release/bin/touchstone-server")
+    program = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM") or _REPOSITORY / "build/release/bin/touchstone-server")
     if not program.exists():
-        pytest.fail(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER.")
+        pytest.fail(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER_PROGRAM.")
     return program
 
 

@@ -14,7 +14,7 @@ import touchstone
 
 @pytest.fixture(autouse=True)
 def named(server_program, monkeypatch):
-    monkeypatch.setenv("TOUCHSTONE_SERVER", str(server_program))
+    monkeypatch.setenv("TOUCHSTONE_SERVER_PROGRAM", str(server_program))
 
 
 def expect_serving(target):
@@ -87,8 +87,8 @@ def test_a_thread_that_ends_does_not_take_it_along():
 
 
 def test_no_server_to_start_is_said_with_what_to_do(monkeypatch, tmp_path):
-    monkeypatch.setenv("TOUCHSTONE_SERVER", str(tmp_path / "nothing"))
-    with pytest.raises(touchstone.SourceUnreachable, match=r"TOUCHSTONE_SERVER is .*nothing"):
+    monkeypatch.setenv("TOUCHSTONE_SERVER_PROGRAM", str(tmp_path / "nothing"))
+    with pytest.raises(touchstone.SourceUnreachable, match=r"TOUCHSTONE_SERVER_PROGRAM is .*nothing"):
         touchstone.connect()
 
 
@@ -99,6 +99,28 @@ def test_a_server_that_does_not_start_is_quoted(monkeypatch, tmp_path, says):
     program = tmp_path / "touchstone-server"
     program.write_text(f"#!/bin/sh\n{says}\nexit 4\n")
     program.chmod(0o755)
-    monkeypatch.setenv("TOUCHSTONE_SERVER", str(program))
+    monkeypatch.setenv("TOUCHSTONE_SERVER_PROGRAM", str(program))
     with pytest.raises(touchstone.SourceUnreachable, match="ended with 4: no disk left"):
+        touchstone.connect()
+
+
+def test_the_variable_names_the_source_of_a_connect_without_one(server, monkeypatch):
+    monkeypatch.setenv("TOUCHSTONE_SERVER", server.target)
+    with touchstone.connect() as client:
+        assert client.target == server.target
+        assert client.own_server is None
+    with touchstone.connect("none") as client:
+        assert client.own_server is not None
+        assert client.target != server.target
+
+
+def test_an_address_goes_before_the_variable(server, monkeypatch):
+    monkeypatch.setenv("TOUCHSTONE_SERVER", "127.0.0.1:1")
+    with touchstone.connect(server.target) as client:
+        assert client.target == server.target
+
+
+def test_a_path_in_the_variable_is_refused_with_the_right_variable(server_program, monkeypatch):
+    monkeypatch.setenv("TOUCHSTONE_SERVER", str(server_program))
+    with pytest.raises(touchstone.InvalidRequest, match=r"is a path.*TOUCHSTONE_SERVER_PROGRAM"):
         touchstone.connect()

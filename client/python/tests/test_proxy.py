@@ -15,7 +15,7 @@ import touchstone
 from touchstone.channel import is_local, proxy_for
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER") or ROOT / "build/release/bin/touchstone-server").parent
+BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM") or ROOT / "build/release/bin/touchstone-server").parent
 VARIABLES = ("http_proxy", "https_proxy", "grpc_proxy")
 TOKEN = "a-token-that-nobody-may-see"
 # A name that nothing resolves: only a proxy reaches it.
@@ -147,7 +147,7 @@ def test_the_proxy_of_others_is_that_which_grpc_takes(monkeypatch, variables, wo
 
 
 def test_this_machine_is_reached_without_a_proxy(server, proxy, server_program, monkeypatch):
-    monkeypatch.setenv("TOUCHSTONE_SERVER", str(server_program))
+    monkeypatch.setenv("TOUCHSTONE_SERVER_PROGRAM", str(server_program))
     for target in (server.target, f"localhost:{server.port}"):
         with touchstone.connect(target, token=TOKEN) as client:
             assert client.objects()

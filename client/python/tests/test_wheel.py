@@ -53,7 +53,7 @@ def installed(wheel, tmp_path_factory):
 
 def run_there(installed, *command):
     environment = {**os.environ, "PYTHONPATH": str(installed)}
-    environment.pop("TOUCHSTONE_SERVER")
+    environment.pop("TOUCHSTONE_SERVER_PROGRAM")
     return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
 
 

@@ -52,6 +52,7 @@ class EncodedImages(Sequence[bytes]):
 
     @classmethod
     def joined(cls, parts: Sequence[EncodedImages]) -> EncodedImages:
+        """Those of several batches, one after the other."""
         offsets = [0]
         for part in parts:
             offsets += [offsets[-1] + offset for offset in part._offsets[1:]]
@@ -87,23 +88,42 @@ def decode_column(column: types_pb2.Column, rows: int) -> Column:
 
 
 class Columns(TypedDict, total=False):
-    """What a batch may hold, in the units of labs; which of them depends on the dataset's `columns` and `image`."""
+    """What a batch may hold, in the units of labs; which of them depends on the dataset's `columns` and `image`.
+
+    Attributes:
+      index: (rows,) number of the sample in the dataset.
+      object: (rows,) position in the dataset's objects.
+      descriptor_us: (rows, fingers) contact times less the first finger's.
+      contact_time_us: (rows, fingers) since the approach began.
+      travel_mm: (rows, fingers) until contact.
+      target_mm: (rows, 3) that the middle finger aims at, object frame.
+      approach: (rows, 3) unit direction of motion.
+      lateral: (rows, 3) unit vector from the first finger to the last.
+      standoff_mm: (rows,) from the start to the target.
+      speed_mm_s: (rows,) commanded.
+      contact_point_mm: (rows, fingers, 3) in the object frame.
+      normal: (rows, fingers, 3) outward, of the surface there.
+      complete: (rows,) whether every finger made contact; of Client.touch().
+      image: (rows, height, width, channels), or EncodedImages.
+      depth_mm: (rows, height, width) along the viewing axis, 0 where no object is.
+      mask: (rows, height, width) 255 where the object is, else 0.
+    """
 
     index: NDArray[np.uint64]
-    object: NDArray[np.int64]  # position in the dataset's objects
-    descriptor_us: NDArray[np.float32]  # (rows, fingers)
-    contact_time_us: NDArray[np.float32]  # (rows, fingers)
-    travel_mm: NDArray[np.float32]  # (rows, fingers)
-    target_mm: NDArray[np.float32]  # (rows, 3), as approach and lateral
+    object: NDArray[np.int64]
+    descriptor_us: NDArray[np.float32]
+    contact_time_us: NDArray[np.float32]
+    travel_mm: NDArray[np.float32]
+    target_mm: NDArray[np.float32]
     approach: NDArray[np.float32]
     lateral: NDArray[np.float32]
     standoff_mm: NDArray[np.float32]
     speed_mm_s: NDArray[np.float32]
-    contact_point_mm: NDArray[np.float32]  # (rows, fingers, 3), as normal
+    contact_point_mm: NDArray[np.float32]
     normal: NDArray[np.float32]
-    complete: NDArray[np.bool_]  # of Client.touch()
-    image: NDArray[np.uint8] | EncodedImages  # (rows, height, width, channels)
-    depth_mm: NDArray[np.float32]  # (rows, height, width), as mask
+    complete: NDArray[np.bool_]
+    image: NDArray[np.uint8] | EncodedImages
+    depth_mm: NDArray[np.float32]
     mask: NDArray[np.uint8]
 
 
@@ -138,10 +158,13 @@ class Batch(Mapping[str, Any], Tabular):
     @classmethod
     def from_columns(cls, start_index: int, rows: int, columns: Iterable[types_pb2.Column], *, model_hash: str = "",
                      si: bool = False) -> Batch:
+        """A batch of a message's columns, by the names of labs or (`si`) those on the wire. SourceFailed where a column's bytes are not
+        those of its shape."""
         return cls(start_index, rows, {c.name: decode_column(c, rows) for c in columns}, model_hash=model_hash, si=si)
 
     @property
     def indices(self) -> NDArray[np.int64]:
+        """Of the samples, (rows,)."""
         if self._indices is None:
             self._indices = np.arange(self.start_index, self.start_index + self.rows, dtype=np.int64)
         return self._indices

@@ -23,7 +23,8 @@ def box_touches(min_mm: Sequence[float], max_mm: Sequence[float], samples_per_fa
     finger goes behind the box's face tells, and so does a finger that meets nothing.
 
     Args:
-      min_mm, max_mm: (3,) corners of the box in the object frame; it should hold every object that may lie there.
+      min_mm: (3,) lower corner of the box in the object frame, mm; the box should hold every object that may lie there.
+      max_mm: (3,) its upper corner, mm.
       samples_per_face: touches of each face, in the order +x, -x, +y, -y, +z, -z.
       seed: of the lines; nothing else decides them.
       max_tilt_deg: largest angle between the approach and the inward face normal, 0 to 60.

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import checks, units
 from .batch import Batch
-from .connection import Connection, Targets
+from .connection import Connection, Targets, chosen_targets
 from .credentials import Credentials
 from .dataset import Dataset
 from .diagnosis import Diagnosis
@@ -42,16 +42,22 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
 
     Args:
-      targets: "host:port", several of them, or none: then a touchstone-server is started for this process, which ends
-        with client.close() or with the process.
+      targets: "host:port", or several of them. Default: TOUCHSTONE_SERVER. Without either, and for "none", a touchstone-server is
+        started for this process, which ends with client.close() or with the process.
       timeout_s: how long to wait for the first answer, of each target; SourceUnreachable after that.
       retry_for_s: how long a lost source is tried again, and the other targets with it, before
         SourceUnreachable is raised; counted from the last thing that arrived.
       ca: speak TLS: PEM file of the CA of the source's certificate, or "system". Default: TOUCHSTONE_TLS_CA.
-      cert, key: PEM files of a client certificate. Default: TOUCHSTONE_TLS_CERT and TOUCHSTONE_TLS_KEY.
+      cert: PEM file of a client certificate. Default: TOUCHSTONE_TLS_CERT.
+      key: PEM file of its private key. Default: TOUCHSTONE_TLS_KEY.
       token: that the source asks for. Default: TOUCHSTONE_TOKEN.
       token_file: file with it, read for every call, so that it may be replaced. Default: TOUCHSTONE_TOKEN_FILE.
+
+    Raises:
+      SourceUnreachable: none of them answers, or TLS or credentials do not fit; the message says which.
+      InvalidRequest: a target is no "host:port".
     """
+    targets = chosen_targets(targets)
     if targets is None:
         own = OwnServer()
         # A source of our own asks for nothing, whatever the environment has for others.
@@ -66,9 +72,12 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
 class Client(Diagnosis):
     """A source of touches and images. Usable as a context manager.
 
-    The constructor does not connect; the first method that is called does.
+    The constructor does not connect; the first method that is called does. Every method raises InvalidRequest for what cannot be
+    meant, NotFound for an object or model that the source does not have, Refused where it will not (a lease, a limit, a right), and
+    SourceUnreachable once a lost source was tried again for retry_for_s.
 
     Attributes:
+      rig: the Rig, where the source is one.
       own_server: that connect() started for it, or None; close() ends it.
     """
 
@@ -84,6 +93,7 @@ class Client(Diagnosis):
 
     @property
     def targets(self) -> tuple[str, ...]:
+        """All that it may use, "host:port"."""
         return self._connection.targets
 
     @property
@@ -93,6 +103,7 @@ class Client(Diagnosis):
 
     @property
     def retry_for_s(self) -> float:
+        """How long a lost source is tried again before SourceUnreachable, seconds."""
         return self._connection.retry_for_s
 
     @property
@@ -101,6 +112,7 @@ class Client(Diagnosis):
         return self._connection.credentials
 
     def close(self) -> None:
+        """Closes the connection, and ends the server that connect() started for this client."""
         self._connection.close()
         if self.own_server is not None:
             self.own_server.stop()
@@ -315,7 +327,8 @@ class Client(Diagnosis):
           normalize: as image(normalize=True): dark objects on white.
           model: whose effects of photographs act on a virtual source's pictures (shaded style only); default: the
             source's. A name, a hash, a path to a model file, its text, or a Model.
-          seed, start: view k draws the pixels' noise of index start + k.
+          seed: of the pixels' noise, 0 to 2^64 - 1.
+          start: view k draws the noise of index start + k.
 
         Returns:
           A batch with `image`, uint8 (N, height, width, channels) or EncodedImages, and `depth_mm`, `mask` if asked.
@@ -359,7 +372,8 @@ class Client(Diagnosis):
           models_from: the same report: each sample has a model of its own, drawn from what the report leaves open. The
             column "model_values" has its values, in the order of report.message.posterior.values.
           batch_size: samples a batch; default 4096, 64 with images.
-          start, stop: a part of the dataset, samples start .. stop - 1.
+          start: first sample of a part of the dataset.
+          stop: the one after its last.
           stride: of every `stride` batches the first is delivered: worker w of W takes
             start=w * batch_size, stride=W.
           units: "lab" (mm, us, deg, mm/s), or "si": the wire's own columns (descriptor_s, ...), never copied.

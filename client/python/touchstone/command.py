@@ -12,9 +12,11 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import re
 import shutil
 import signal
 import sys
+import textwrap
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -25,13 +27,29 @@ from .printable import printable
 BAD_INPUT, UNREACHABLE, REFUSED, INTERRUPTED = 2, 3, 4, 130
 
 
+def _columns() -> int:
+    """Of standard output, or what COLUMNS says; at least 60; 110 where it is no terminal."""
+    return max(60, shutil.get_terminal_size((110, 24)).columns)
+
+
+def _fitted(example: str, columns: int) -> str:
+    """An example, as the other commands show it: one that is too wide goes on after a backslash, its remark under it."""
+    if len(example) + 2 <= columns or not sys.stdout.isatty():
+        return f"  {example}\n"
+    command, _, remark = example.partition("   ")
+    lines = textwrap.wrap(command, columns - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    return "  " + " \\\n  ".join(lines) + "\n" + (f"      # {remark.strip()}\n" if remark else "")
+
+
 class _ExamplesFirst(argparse.HelpFormatter):
     """The layout of the help of every command: what it is, examples, usage, arguments, options."""
 
     def __init__(self, prog: str):
-        # As wide as the texts of the other commands: from 60 to 110 columns.
-        super().__init__(prog, max_help_position=32, width=min(110, max(60, shutil.get_terminal_size((110, 24)).columns)))
-        self._action_max_length = 30  # texts begin at one column in every help
+        # As wide as the texts of the other commands: from 60 to 110 columns. Texts begin at one column in every help.
+        width = _columns()
+        column = 6 if width < 70 else 26 if width < 100 else 32
+        super().__init__(prog, max_help_position=column, width=min(110, width))
+        self._action_max_length = column - 2
 
     def _format_action_invocation(self, action: argparse.Action) -> str:
         if not action.option_strings:
@@ -53,7 +71,7 @@ class CommandParser(argparse.ArgumentParser):
     def __init__(self, name: str, description: str, examples: str):
         super().__init__(prog=f"touchstone {name}", description=description, formatter_class=_ExamplesFirst, allow_abbrev=False,
                          add_help=False)
-        self._examples = "".join(f"  {line}\n" for line in examples.split("\n"))
+        self._examples = examples.split("\n")
         self._positionals.title, self._optionals.title = "Arguments", "Options"
         self._output = self.add_argument_group("Output")
         self._output.add_argument("-h", "--help", action="help", help="This text")
@@ -74,7 +92,8 @@ class CommandParser(argparse.ArgumentParser):
             rest.start_section(group.title)
             rest.add_arguments(group._group_actions)
             rest.end_section()
-        return f"{described.format_help()}\nExamples:\n{self._examples}\n{rest.format_help()}"
+        shown = "".join(_fitted(line, _columns()) for line in self._examples)
+        return f"{described.format_help()}\nExamples:\n{shown}\n{rest.format_help()}"
 
     def parse(self, words: list[str]) -> argparse.Namespace:
         options, left = self.parse_known_args(words)
@@ -92,6 +111,19 @@ class CommandParser(argparse.ArgumentParser):
         missing = message.removeprefix("the following arguments are required: ")
         _complain(f"{message if missing == message else missing + ' is required'} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
+
+
+def whole_number(text: str) -> int:
+    """A count or a seed as the other commands read it (client/cli/whole_number.h): "1000", "1_000_000", "1e6"; from 0 to 2^64 - 1."""
+    match = re.fullmatch(r"(\d+(?:_\d+)*)(?:\.(\d+))?(?:[eE]\+?(\d+))?", text, re.ASCII)
+    fraction = (match[2] or "").rstrip("0") if match else ""
+    exponent = int(match[3] or 0) - len(fraction) if match else -1
+    if match is None or exponent < 0:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 on; one like 1000, 1_000 or 1e3 was expected")
+    value: int = int(match[1] + fraction) * 10 ** min(exponent, 20)
+    if value >= 2**64:
+        raise argparse.ArgumentTypeError(f"'{text}' is too large; at most {2**64 - 1}")
+    return value
 
 
 def did_you_mean(word: str, known: list[str]) -> str:

@@ -12,6 +12,7 @@ import grpc
 
 from . import errors, retry
 from .credentials import Credentials
+from .errors import InvalidRequest
 from .retry import Retry
 
 Targets = Union[str, Sequence[str]]
@@ -51,6 +52,17 @@ def grpc_was_used_before_fork() -> bool:
 def grpc_was_used() -> bool:
     """True if a process forked now could not use gRPC."""
     return bool(_processes_with_grpc)
+
+
+def chosen_targets(targets: Targets | None) -> Targets | None:
+    """What to connect to, as --server of the command line: what is given, else TOUCHSTONE_SERVER; None, also of "none": a server of
+    one's own. InvalidRequest where the variable holds a path."""
+    if targets is None:
+        targets = os.environ.get("TOUCHSTONE_SERVER") or None
+        if targets is not None and targets[0] in "/.":
+            raise InvalidRequest(f"TOUCHSTONE_SERVER: '{targets}' is a path; \"host:port\" was expected (TOUCHSTONE_SERVER_PROGRAM names the "
+                                 "program that connect() starts).")
+    return None if targets == "none" else targets
 
 
 def parse_targets(targets: Targets) -> tuple[str, ...]:

@@ -60,6 +60,7 @@ class Credentials:
         return token
 
     def channel(self, target: str, options: Any) -> grpc.Channel:
+        """A gRPC channel to "host:port" with these. InvalidRequest where the token would go out in plain text, or a file cannot be read."""
         if self.read_token() and not self.ca and not is_local(target):
             raise errors.InvalidRequest(
                 f"The token would go to {target} in plain text, where others can read it: give the CA of the source's "

@@ -84,7 +84,8 @@ class Dataset:
 
     Attributes:
       spec: the specification, as sent.
-      start, stop: first sample and the one after the last.
+      start: first sample.
+      stop: the one after the last.
       batch_size: samples a batch; the last one may be shorter.
       stride: of every `stride` batches the first is delivered, the others are left out.
     """

@@ -38,6 +38,16 @@ class Diagnosis:
         """How wrong the model is, and where; changes nothing. With another model, of touches: report.versus says which errs less.
 
         Of several measurement files, sessions of one rig: the error in each (report.data), and report.sessions.
+
+        Args:
+          measurements: a measurement file (.csv), a folder of photographs, the name of a session at the server, or a list of files.
+          model: a name, a hash, a path to a model file, its text, or a Model; default: the server's.
+          meshes: a folder with a file for each object, or {object: file or touchstone.Mesh}; none for objects that the server has.
+          other_model: a second model, of touches.
+          on_progress: is told the stage and the share that is done, 0 to 1.
+
+        Raises:
+          InvalidRequest: a file, a row or the model cannot be used; the message says where.
         """
         first, further = sessions(measurements, model, meshes, (), 0)
         request = diagnosis_pb2.CompareRequest(evidence=first, further=further)
@@ -54,10 +64,15 @@ class Diagnosis:
           measurements: also several files, sessions of one rig in the order in which they were made: report.sessions says
             which values they share and which changed; the improved model is that of the last one.
           model: a name, a hash, a path to a model file, its text, or a Model; default: the server's.
+          meshes: as of compare().
           also: model files whose effects compete with the catalogue.
-          seed: of permutations and draws.
+          seed: of permutations and draws, 0 to 2^64 - 1.
           with_surface_map: put a map of the surfaces' departures into the improved model, where they are what is left.
-          on_progress: is told the stage and the share that is done.
+          on_progress: is told the stage and the share that is done, 0 to 1.
+
+        Raises:
+          InvalidRequest: a file, a row or the model cannot be used; the message says where. Mistakes in the data that can be read
+            are no error: report.verdict is "check_data".
         """
         first, further = sessions(measurements, model, meshes, also, seed)
         request = diagnosis_pb2.DiagnoseRequest(evidence=first, further=further, with_surface_map=with_surface_map)
@@ -68,8 +83,15 @@ class Diagnosis:
                 on_progress: OnProgress | None = None) -> Report:
         """The touches (or photographs) to make next to tell the explanations that are left apart: report.next_touches.
 
-        touches: how many (24); photographs: how many (12), where there are photographs. Of a set of both kinds the one that
-        is given is proposed, photographs if neither is.
+        Args:
+          measurements: a measurement file or a folder of photographs.
+          model: as of compare().
+          meshes: as of compare().
+          touches: how many, from 1. Default: 24.
+          photographs: how many, from 1, where there are photographs. Default: 12. Of a set of both kinds the one that is given is
+            proposed, photographs if neither is.
+          seed: of draws, 0 to 2^64 - 1.
+          on_progress: is told the stage and the share that is done, 0 to 1.
         """
         request = diagnosis_pb2.ProposeRequest(evidence=evidence(measurements, model, meshes, (), seed))
         if touches is not None:
@@ -85,10 +107,14 @@ class Diagnosis:
 
         Args:
           plan: a measurement file; its times, if it has any, are not read.
+          model: as of compare(); what the rig is thought to be.
+          meshes: as of compare().
           noise_us: standard deviation of one finger's time; default: that of the model's noise.
           improve: how many touches to propose (report.next_touches), for one of the next two questions.
           find: an effect that is to be found at smaller sizes.
           between: two effects that are to be told apart.
+          seed: of draws, 0 to 2^64 - 1.
+          on_progress: is told the stage and the share that is done, 0 to 1.
         """
         request = diagnosis_pb2.CheckRequest(
             evidence=evidence(plan, model, meshes, (), seed), improve=checks.whole_number("improve", improve, 0, 2**32 - 1),
@@ -100,7 +126,15 @@ class Diagnosis:
 
     def explain(self, effect: str, measurements: str | os.PathLike[str], model: ModelLike = None, *,
                 meshes: MeshesLike = None, on_progress: OnProgress | None = None) -> Report:
-        """Why one effect is, or is not, what the model lacks: report.explained. Of touches with poses."""
+        """Why one effect is, or is not, what the model lacks: report.explained. Of touches with poses.
+
+        Args:
+          effect: its name in the catalogue, "tip_radius".
+          measurements: a measurement file, or the name of a session at the server.
+          model: as of compare().
+          meshes: as of compare().
+          on_progress: is told the stage and the share that is done, 0 to 1.
+        """
         request = diagnosis_pb2.ExplainRequest(evidence=evidence(measurements, model, meshes, (), 0), effect=effect)
         return self._report("Explain", request, on_progress)
 

@@ -155,9 +155,11 @@ class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
 
     @property
     def objects(self) -> tuple[str, ...]:
+        """The names that answers stand for, in order."""
         return tuple(self._table.objects)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins an episode: an object is drawn, or options={"object": name} names it. InvalidRequest for a name that is not among them."""
         super().reset(seed=seed)
         self._object = _drawn(self._table, self.np_random, options)
         self._made = 0
@@ -165,6 +167,8 @@ class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
         return self._seen.copy(), {"touches": 0}
 
     def step(self, action: int | np.integer[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """A touch or an answer: observation, reward, terminated, truncated, info. InvalidRequest without an episode, or for an action
+        out of range."""
         if self._object is None:
             raise InvalidRequest("The episode is over, or none has begun; call reset().")
         if not self.action_space.contains(action):
@@ -185,6 +189,7 @@ class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
         return self._seen.copy(), -table.touch_cost, False, truncated, {"touches": self._made}
 
     def close(self) -> None:
+        """Closes the connection, and ends the server that was started for this environment."""
         self._table.close()
 
 
@@ -217,10 +222,13 @@ class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[An
 
     @property
     def objects(self) -> tuple[str, ...]:
+        """The names that answers stand for, in order."""
         return tuple(self._table.objects)
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
               options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins an episode in every environment; observations are (num_envs, touches, 1 + 2 * fingers). `seed`: one number, or one
+        per environment."""
         seeds: list[int | None] = [None] * self.num_envs
         if isinstance(seed, (int, np.integer)):
             seeds = [int(seed) + k for k in range(self.num_envs)]
@@ -237,6 +245,7 @@ class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[An
 
     def step(self, actions: NDArray[np.integer[Any]]) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_],
                                                                NDArray[np.bool_], dict[str, Any]]:
+        """One step of every environment, for (num_envs,) whole numbers: one request to the source. InvalidRequest as of RecogniseEnv."""
         if self._ended is None:
             raise InvalidRequest("No episode has begun; call reset().")
         actions = np.asarray(actions)
@@ -265,6 +274,7 @@ class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[An
         return self._seen.copy(), reward, answered, truncated, info
 
     def close_extras(self, **_: Any) -> None:
+        """Closes what the environments share; close() calls it."""
         self._table.close()
 
     def _begin(self, places: NDArray[np.integer[Any]], options: dict[str, Any] | None) -> None:

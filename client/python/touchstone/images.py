@@ -36,7 +36,7 @@ def renderer_name(kind: int) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class ImageOptions:
-    """See image()."""
+    """What image() makes; its attributes are image()'s arguments."""
 
     width: int
     height: int
@@ -74,13 +74,16 @@ def image(width: int = 224, height: int = 224, format: str = "grey", encoding: s
     """How the column "image" is made.
 
     Args:
-      width, height: pixels, 1 to 2048.
+      width: pixels, 1 to 2048.
+      height: the same.
       format: "grey" (1 channel) or "rgb" (3).
       encoding: "raw" gives arrays, "png" and "jpeg" give EncodedImages.
       depth: also "depth_mm", float32 (rows, height, width) along the viewing axis, 0 where no object is.
       mask: also "mask", uint8 (rows, height, width), 255 where the object is.
       shading_style: "shaded" (white lights, black background) or "dark_on_white".
       renderer: "egl", "cpu", or "auto": the source's choice. Two renderers may differ by 1/255.
+      jpeg_quality: 1 to 100, of "jpeg".
+      vertical_fov_deg: field of view, above 0, below 180.
       normalize: a dark object on white, without ground and shadows, whatever was photographed, in grey; "mask" is
         then the one that this found. A picture without ground around the object becomes white, and its mask empty.
     """
@@ -110,9 +113,11 @@ class Camera:
     """A camera pose in the object frame.
 
     Attributes:
-      eye_mm, at_mm: where it stands and what it looks at.
+      eye_mm: (3,) where it stands.
+      at_mm: (3,) what it looks at.
       up: upwards in the image; need not be perpendicular to the viewing axis.
-      near_mm, far_mm: along the viewing axis; both 0: they enclose the object.
+      near_mm: what is nearer along the viewing axis is not drawn; 0, as far_mm: both enclose the object.
+      far_mm: what is farther is not drawn.
     """
 
     eye_mm: Sequence[float]
@@ -122,6 +127,7 @@ class Camera:
     far_mm: float = 0.0
 
     def to_view(self) -> source_pb2.View:
+        """The camera as touchstone.v1.View, SI. InvalidRequest where a vector has not three numbers."""
         return source_pb2.View(
             camera=source_pb2.CameraPose(
                 eye_m=_vector("eye_mm", self.eye_mm, 1e3),

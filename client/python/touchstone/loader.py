@@ -43,16 +43,20 @@ class TouchstoneLoader:
 
     @property
     def epoch(self) -> int:
+        """The epoch that is under way or comes next, from 0."""
         return self.dataset.epoch
 
     def set_epoch(self, epoch: int) -> None:
+        """Begins that epoch with the next `for`."""
         self.dataset.set_epoch(epoch)
         self._fresh = True
 
     def state_dict(self) -> dict[str, Any]:
+        """Where the batches that were returned end: plain types, for load_state_dict() in any process and with any number of workers."""
         return self.dataset.state_dict()
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Goes on where a state ends, with the next `for`. InvalidRequest where it is of another dataset."""
         self.dataset.load_state_dict(state)
         self._fresh = True
 

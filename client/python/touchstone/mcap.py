@@ -57,6 +57,7 @@ class ExportError(Exception):
 
 
 def time_of(unix_s: float) -> dict[str, int]:
+    """Unix seconds as Foxglove's schemas write a time: whole seconds and nanoseconds."""
     ns = _ns(unix_s)
     return {"sec": ns // SECOND_NS, "nsec": ns % SECOND_NS}
 
@@ -160,6 +161,7 @@ class SessionFile:
         self._file.close()
 
     def recorded_touches(self) -> Iterator[types_pb2.RecordedTouch]:
+        """Every touch of the journal, in its order, SI. ExportError where a row cannot be read."""
         file = self._file
         ids, objects, up_faces = (_texts(file[name]) for name in ("id", "object", "placement"))
         commands = _byte_strings(file, "command")
@@ -283,6 +285,7 @@ def _write(source: SessionFile, writer: Any) -> dict[str, int]:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """The command `python -m touchstone.mcap`; returns its exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m touchstone.mcap", formatter_class=argparse.RawDescriptionHelpFormatter, description=__doc__)
     parser.add_argument("session", help="an HDF5 file of touchstone session export")

@@ -44,7 +44,11 @@ class Row:
 
 
 def read_plan(path: str | os.PathLike[str]) -> list[Row]:
-    """The rows of a plan or measurement file that has poses. Errors name file, line and column."""
+    """The rows of a plan or measurement file that has poses: CSV with the columns of client/python/README.md, mm, us, mm/s.
+
+    Raises:
+      InvalidRequest: the file cannot be read, or is none; the message names file, line and column.
+    """
     try:
         with open(path, newline="", encoding="utf-8") as file:
             reader = csv.reader(file)
@@ -87,7 +91,12 @@ def number_in(place: str, row: Mapping[str, str], name: str, empty: float | None
 
 
 def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row]) -> None:
-    """Writes a measurement file atomically: it is written beside the path and renamed."""
+    """Writes a measurement file atomically: it is written beside the path and renamed.
+
+    Raises:
+      InvalidRequest: a row has another number of times than the first one.
+      OSError: the file cannot be written; what was there stays.
+    """
     rows = list(rows)
     fingers = len(rows[0].time_us) if rows else 0
     names = ["l", "m", "r"] if fingers == 3 else [str(k) for k in range(fingers)]

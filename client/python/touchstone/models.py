@@ -22,14 +22,33 @@ def source_kind(kind: int) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """What a source is and what it can do; limits are 0 where a method is not offered."""
+    """What a source is and what it can do; limits are 0 where a method is not offered.
 
-    kind: str  # "virtual" or "physical"
+    Attributes:
+      kind: "virtual" or "physical".
+      version: of its program.
+      plans: the plans that make sense here: "sphere", "faces", "list".
+      default_model: name of the model of requests that name none; "" at a physical source.
+      default_model_hash: its hash.
+      renderer: "egl", "cpu" or "": no camera.
+      renderer_description: the renderer in words.
+      max_touches_per_request: limit of Client.touch().
+      max_images_per_request: limit of Client.capture().
+      max_image_side: largest width and height, pixels.
+      max_batch_size: samples of a batch.
+      max_fingers: of a model.
+      lease_required: whether touches need a lease.
+      touch_duration_s: what one touch takes, about; 0: as fast as it computes.
+      clock_uncertainty_us: standard uncertainty of contact times; 0: exact.
+      max_indices_per_request: samples of one request by index.
+    """
+
+    kind: str
     version: str
     plans: tuple[str, ...]
     default_model: str
     default_model_hash: str
-    renderer: str  # "egl", "cpu" or "": no camera
+    renderer: str
     renderer_description: str
     max_touches_per_request: int
     max_images_per_request: int
@@ -54,7 +73,18 @@ class Description:
 
 @dataclasses.dataclass(frozen=True)
 class ObjectInfo:
-    """An object that can be touched; its box is in the object frame."""
+    """An object that can be touched.
+
+    Attributes:
+      name: as in Client.dataset().
+      vertices: of its mesh.
+      triangles: of its mesh.
+      bounds_min_mm: lower corner of its box in the object frame.
+      bounds_max_mm: upper corner.
+      closed: no edge is open or shared by more than two triangles.
+      mesh_hash: SHA-256 of the mesh.
+      origin: "built-in supershape", or the file's name.
+    """
 
     name: str
     vertices: int
@@ -95,11 +125,23 @@ _STAGES = {
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect, in the unit of model files."""
+    """A parameter of an effect, in the unit of model files.
+
+    Attributes:
+      name: ends in the unit, "radius_mm".
+      unit: "mm"; "" of a share or a count.
+      arity: "scalar", "vector3" (object frame unless said), "vector2" (image) or "finger" (one value per finger).
+      min: smallest value that a model may have.
+      max: largest.
+      default: the value that changes nothing.
+      typical: what rigs usually show.
+      sum_zero: the fingers' values have the sum 0.
+      meaning: in words.
+    """
 
     name: str
     unit: str
-    arity: str  # "scalar", "vector3" (object frame unless said), "vector2" (image) or "finger" (one value per finger)
+    arity: str
     min: float
     max: float
     default: float
@@ -110,10 +152,20 @@ class Parameter:
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
-    """An effect of the catalogue."""
+    """An effect of the catalogue.
+
+    Attributes:
+      name: as in a model file, "tip_radius".
+      stage: "pose", "contact", "motion" or "sensor" of a touch; "camera pose", "projection", "shading" or "image sensor" of a photograph.
+      meaning: what it is.
+      signature: how it shows in measurements.
+      check_on_rig: how to find out at the rig.
+      remedy: what to do about it.
+      parameters: what it takes.
+    """
 
     name: str
-    stage: str  # "pose", "contact", "motion", "sensor", or a photograph's: "camera pose", ..., "image sensor"
+    stage: str
     meaning: str
     signature: str
     check_on_rig: str
@@ -135,7 +187,15 @@ class Effect:
 
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """A model in the source's store; `yaml` is the model file."""
+    """A model in the source's store.
+
+    Attributes:
+      name: in the store.
+      hash: SHA-256 of its content, 64 hexadecimal digits.
+      yaml: the whole model file.
+      fingers: of the end effector.
+      spacing_mm: between neighbouring fingers.
+    """
 
     name: str
     hash: str
@@ -191,6 +251,7 @@ def _with_content(found: re.Match[str], folder: pathlib.Path) -> str:
 
 
 def read_model_file(path: str | os.PathLike[str]) -> str:
+    """The text of a model file, with the surface map in it that it names. InvalidRequest where it cannot be read."""
     try:
         text = pathlib.Path(path).read_text(encoding="utf-8")
         return re.sub(_SURFACE_MAP, lambda found: _with_content(found, pathlib.Path(path).parent), text)

@@ -32,12 +32,12 @@ wait "$server"
 
 
 def find_server() -> str:
-    """The program: TOUCHSTONE_SERVER, else that of this wheel, else from PATH, else of the build beside this source tree."""
-    named = os.environ.get("TOUCHSTONE_SERVER")
+    """The program: TOUCHSTONE_SERVER_PROGRAM, else that of this wheel, else from PATH, else of the build beside this source tree."""
+    named = os.environ.get("TOUCHSTONE_SERVER_PROGRAM")
     if named:
         if os.access(named, os.X_OK):
             return named
-        raise SourceUnreachable(f"TOUCHSTONE_SERVER is {named!r}, which is no program that can be run.")
+        raise SourceUnreachable(f"TOUCHSTONE_SERVER_PROGRAM is {named!r}, which is no program that can be run.")
     here = pathlib.Path(__file__).resolve()
     bundled = str(here.parents[1] / "touchstone_sim/bin/touchstone-server")
     built = str(here.parents[3] / "build/release/bin/touchstone-server")
@@ -46,7 +46,7 @@ def find_server() -> str:
             return found
     raise SourceUnreachable(
         "connect() without an address starts a touchstone-server of its own, and there is none in PATH. Put it there, "
-        'name it in TOUCHSTONE_SERVER, or give the address of one that runs: connect("HOST:PORT").'
+        'name it in TOUCHSTONE_SERVER_PROGRAM, or give the address of one that runs: connect("HOST:PORT").'
     )
 
 

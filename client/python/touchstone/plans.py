@@ -27,7 +27,7 @@ def plan_message(plan: PlanLike) -> source_pb2.Plan:
 
 @dataclasses.dataclass(frozen=True)
 class SpherePlan:
-    """See sphere()."""
+    """What sphere() makes; its attributes are sphere()'s arguments."""
 
     step_angle_deg: float
     roll_step_deg: float
@@ -55,7 +55,7 @@ class SpherePlan:
 
 @dataclasses.dataclass(frozen=True)
 class FacesPlan:
-    """See faces()."""
+    """What faces() makes; its attributes are faces()'s arguments."""
 
     samples_per_face: int
     rounds: int
@@ -81,6 +81,7 @@ class FacesPlan:
         )
 
     def samples(self, objects: int) -> int:
+        """Samples of all touches taken once, for so many objects."""
         return 6 * self.samples_per_face * self.rounds * objects
 
 
@@ -130,12 +131,14 @@ class Touches:
         return Touches(**picked, covariates={name: values[rows] for name, values in self.covariates.items()})
 
     def samples(self, objects: int) -> int:
+        """Samples of all touches taken once, for so many objects."""
         return len(self) * objects
 
     def to_proto(self) -> source_pb2.Plan:
         return source_pb2.Plan(list=source_pb2.ListPlan(touches=self.to_messages()))
 
     def to_messages(self) -> list[types_pb2.CommandedTouch]:
+        """One touchstone.v1.CommandedTouch per row, SI."""
         target_m = self.target_mm / 1e3
         messages = []
         for k in range(len(self)):
@@ -157,6 +160,8 @@ class Touches:
 
     @classmethod
     def from_messages(cls, messages: Sequence[types_pb2.CommandedTouch], draws: int = 0) -> Touches:
+        """The touches of touchstone.v1.CommandedTouch messages. Strokes and session times are kept where every message has one."""
+
         def vectors(name: str) -> NDArray[np.float64]:
             return np.array([(v.x, v.y, v.z) for v in (getattr(message, name) for message in messages)], float).reshape(-1, 3)
 
@@ -223,6 +228,9 @@ def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> 
     touches(target_mm=targets, approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=120, speed_mm_s=20)
 
     Names are the attributes of Touches, and "cov_NAME" for covariates; speed_mm_s is 20 unless given.
+
+    Raises:
+      InvalidRequest: a column is missing or unknown, has another shape or another number of rows, or is not finite.
     """
     if rows is not None:
         if columns:

@@ -47,9 +47,11 @@ class TouchstoneDatasource(Datasource):
         self._schema = BlockAccessor.for_block(first).schema()
 
     def get_name(self) -> str:
+        """As Ray shows it."""
         return "Touchstone"
 
     def estimate_inmemory_data_size(self) -> int | None:
+        """Bytes of all samples in memory."""
         return int(self._bytes_per_row * len(self._samples))
 
     def get_read_tasks(self, parallelism: int, per_task_row_limit: int | None = None, *_: Any, **__: Any) -> list[ReadTask]:

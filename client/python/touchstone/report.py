@@ -46,10 +46,12 @@ class Report(Tabular):
 
     @property
     def summary(self) -> str:
+        """The answer in a paragraph, as print(report) gives it."""
         return self.message.summary
 
     @property
     def warnings(self) -> tuple[str, ...]:
+        """What to doubt, a sentence each."""
         return tuple(self.message.warnings)
 
     @property

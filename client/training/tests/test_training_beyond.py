@@ -257,9 +257,9 @@ def test_a_step_that_harms_is_called_so(changes, said):
 
 @pytest.fixture(scope="module")
 def client():
-    program = pathlib.Path(os.environ["TOUCHSTONE_SERVER"])
+    program = pathlib.Path(os.environ["TOUCHSTONE_SERVER_PROGRAM"])
     if not program.exists():
-        pytest.skip(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER.")
+        pytest.skip(f"{program} does not exist; build it, or set TOUCHSTONE_SERVER_PROGRAM.")
     with touchstone.connect() as connected:
         yield connected
 

@@ -13,7 +13,7 @@ import joint
 import photograph
 import sets
 
-PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
+PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
     "touchstone"
 SEED = 1_950_000
 POSE = {"translation_mm": (0.5, -0.3, 0.2), "rotation_deg": (0.2, -0.3, 0.4)}

@@ -15,7 +15,7 @@ import sets  # noqa: E402
 import solids  # noqa: E402
 
 CAMERA = photograph.Camera()
-BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent
+BIN = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM", sets.ROOT / "build/release/bin/touchstone-server")).parent
 
 
 def a_pose(number=0):

@@ -12,7 +12,7 @@ import score  # noqa: E402
 import sets  # noqa: E402
 import strengths  # noqa: E402
 
-PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
+PROGRAM = pathlib.Path(os.environ.get("TOUCHSTONE_SERVER_PROGRAM", sets.ROOT / "build/release/bin/touchstone-server")).parent / \
     "touchstone"
 SEED = 1_900_000  # beyond those of the arms
 PICTURES = 6  # of each object: a third of the time that a whole set takes

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import pathlib
-import sys
-import time
 
 from .. import command
 from ..errors import InvalidRequest, Refused
 from ..printable import printable
+from ..progress import Progress
 from . import recovery
 from .exporting import FORMATS, export
 from .importing import import_recording
@@ -25,26 +24,6 @@ touchstone import recording.mcap --map mapping.yaml -o set.csv   then: touchston
 touchstone import bag_folder --map mapping.yaml -o session.db    a ROS 2 bag, SQLite or MCAP
 touchstone import lerobot_folder --map mapping.yaml -o set.csv
 touchstone import table.parquet -o set.csv                       columns with this program's names need no mapping"""
-
-
-class _Progress:
-    """How far it is, once it takes longer than two seconds: on a terminal in place, elsewhere a line every ten seconds."""
-
-    def __init__(self, quiet: bool):
-        self._quiet, self._began, self._said = quiet, time.monotonic(), 0.0
-        self._terminal = sys.stderr.isatty()
-
-    def __call__(self, done: int, rows: int) -> None:
-        took_s = time.monotonic() - self._began
-        if self._quiet or took_s < 2 or took_s - self._said < (0.2 if self._terminal else 10):
-            return
-        self._said = took_s
-        left_s = took_s * (rows - done) / max(done, 1)
-        print(f"{done} of {rows} rows, {left_s:.0f} s left", end="\x1b[K\r" if self._terminal else "\n", file=sys.stderr, flush=True)
-
-    def clear(self) -> None:
-        if self._said and self._terminal:
-            print("\x1b[K", end="\r", file=sys.stderr, flush=True)
 
 
 def export_parser() -> command.CommandParser:
@@ -64,11 +43,9 @@ def _export(words: list[str]) -> None:
     options = export_parser().parse(words)
     if options.to not in FORMATS:
         raise InvalidRequest(f"--to: unknown format '{options.to}'{command.did_you_mean(options.to, list(FORMATS))}")
-    progress = _Progress(options.quiet)
-    try:
-        written = export(options.source, options.out, options.to, force=options.force, on_rows=progress)
-    finally:
-        progress.clear()
+    with Progress(options.quiet) as progress:
+        progress(f"writing {options.out}")
+        written = export(options.source, options.out, options.to, force=options.force, on_rows=progress.rows)
     if options.json:
         print(json.dumps({"folder": str(written.folder), "format": written.format, "rows": written.rows, "files": list(written.files),
                           "bytes": written.bytes}, indent=2))
@@ -97,7 +74,9 @@ def _import(words: list[str]) -> None:
         return _list(options.source, options.json)
     if options.out is None:
         parser.error("-o/--out is required")
-    made = import_recording(options.source, options.out, options.map, force=options.force)
+    with Progress(options.quiet) as progress:
+        progress(f"reading {options.source}")
+        made = import_recording(options.source, options.out, options.map, force=options.force)
     if options.json:
         print(json.dumps({"file": str(made.path), "touches": made.rows, "left_out": list(made.left_out)}, indent=2))
     for reason in made.left_out[:5]:
@@ -146,7 +125,9 @@ def recover_parser() -> command.CommandParser:
 
 def _verify(words: list[str]) -> None:
     options = verify_parser().parse(words)
-    found = recovery.verify(options.source)
+    with Progress(options.quiet) as progress:
+        progress(f"reading {options.source}")
+        found = recovery.verify(options.source)
     _tell(found, options.json)
     if not found.whole:
         raise Refused(f"{found.path} is not whole: {found.saved} can be read; lost: {found.lost}. `touchstone recover` saves what it can.")
@@ -155,7 +136,9 @@ def _verify(words: list[str]) -> None:
 
 def _recover(words: list[str]) -> None:
     options = recover_parser().parse(words)
-    found = recovery.recover(options.source, options.out, force=options.force)
+    with Progress(options.quiet) as progress:
+        progress(f"reading {options.source}")
+        found = recovery.recover(options.source, options.out, force=options.force)
     _tell(found, options.json)
     command.log(options.quiet, f"wrote {options.out}: {found.saved} saved" + (f"; lost: {found.lost}" if found.lost else "; nothing was lost"))
 

@@ -63,14 +63,18 @@ def export(source: str | os.PathLike[str], out: str | os.PathLike[str], to: str 
            on_rows: Callable[[int, int], None] | None = None) -> Exported:
     """Writes a finished dataset or a measured set in a format of other tools, into a new folder: whole or not at all.
 
-    source: the folder of `touchstone stream`, a measurement file (.csv), the journal of a rig's session (.db), what `touchstone
-    session export` wrote (.h5), or a folder of photographs (images.csv).
-    out: a folder that does not exist; with `force` what is there is replaced, if an export made it.
-    to: "parquet", "lerobot", "webdataset", "hdf5" or "mcap".
-    on_rows: called with the rows that are done and all rows, now and then.
+    Args:
+      source: the folder of `touchstone stream`, a measurement file (.csv), the journal of a rig's session (.db), what `touchstone
+        session export` wrote (.h5), or a folder of photographs (images.csv).
+      out: a folder that does not exist.
+      to: "parquet", "lerobot", "webdataset", "hdf5" or "mcap".
+      force: what is there is replaced, if an export made it.
+      on_rows: called with the rows that are done and all rows, now and then.
 
-    InvalidRequest, NotFound: what cannot be meant; Refused: a dataset that is not finished or was changed, or a package that is
-    missing. Nothing is left of an export that fails.
+    Raises:
+      InvalidRequest: what cannot be meant.
+      NotFound: the source, or the folder that `out` would stand in, is not there.
+      Refused: a dataset that is not finished or was changed, or a package that is missing. Nothing is left of an export that fails.
     """
     write = FORMATS.get(to)
     if write is None:

@@ -21,7 +21,11 @@ from .touch_columns import Array, TouchColumns
 
 
 class OpenQuestions(InvalidRequest):
-    """The mapping leaves something open. `questions`: each in words, with the candidates."""
+    """The mapping leaves something open.
+
+    Attributes:
+      questions: each in words, with the candidates.
+    """
 
     def __init__(self, path: pathlib.Path, questions: list[str]):
         self.questions = questions
@@ -31,7 +35,9 @@ class OpenQuestions(InvalidRequest):
 
 @dataclasses.dataclass(frozen=True)
 class Imported:
-    """Attributes:
+    """A recording as a measured set.
+
+    Attributes:
       path: the measured set.
       rows: touches in it.
       left_out: messages that are no whole touch, a reason each.
@@ -46,11 +52,15 @@ def import_recording(source: str | os.PathLike[str], out: str | os.PathLike[str]
                      force: bool = False) -> Imported:
     """Writes the touches of a recording as a measured set that compare and diagnose read: whole or not at all.
 
-    source: an MCAP file, the folder of a ROS 2 bag, a LeRobot dataset v3, a Parquet file or a folder of them.
-    out: a measurement file (.csv) or a journal (.db).
-    mapping: the mapping file, or its entries; what this program itself named needs none.
+    Args:
+      source: an MCAP file, the folder of a ROS 2 bag, a LeRobot dataset v3, a Parquet file or a folder of them.
+      out: a measurement file (.csv) or a journal (.db).
+      mapping: the mapping file, or its entries; what this program itself named needs none.
+      force: replace `out` if it exists.
 
-    OpenQuestions where the mapping leaves something open; InvalidRequest with entry, field and what would be right.
+    Raises:
+      OpenQuestions: the mapping leaves something open.
+      InvalidRequest: with entry, field and what would be right.
     """
     path, target = pathlib.Path(source), pathlib.Path(out)
     if target.suffix not in (".csv", ".db"):

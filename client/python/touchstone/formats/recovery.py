@@ -39,7 +39,12 @@ class Found:
 
 def verify(source: str | os.PathLike[str]) -> Found:
     """Reads the whole file: a dataset's folder, a shard (.tar), MCAP, Parquet, an exported session (.h5), a journal (.db) or a
-    measurement file (.csv)."""
+    measurement file (.csv).
+
+    Raises:
+      InvalidRequest: it is not there, or of no kind that can be told.
+      Refused: a package is missing that reads it.
+    """
     path = _existing(source)
     if path.is_dir():
         sessions.run_program("dataset", "verify", path)
@@ -48,8 +53,17 @@ def verify(source: str | os.PathLike[str]) -> Found:
 
 
 def recover(source: str | os.PathLike[str], out: str | os.PathLike[str], *, force: bool = False) -> Found:
-    """Writes what is whole of a file to a new one, and says what was saved. The file itself is not changed. Refused where the format
-    leaves nothing that can be read."""
+    """Writes what is whole of a file to a new one, and says what was saved. The file itself is not changed.
+
+    Args:
+      source: a file as of verify(); a dataset's folder is not recovered but resumed.
+      out: the new file.
+      force: replace `out` if it exists.
+
+    Raises:
+      InvalidRequest: the file is not there, or `out` exists.
+      Refused: the format leaves nothing that can be read.
+    """
     path, target = _existing(source), pathlib.Path(out)
     if path.is_dir():
         raise Refused(f"{path}: a dataset is not recovered but resumed. {_AGAIN}; `touchstone dataset verify` says which shards are whole.")

@@ -12,6 +12,7 @@ import sys
 import time
 
 import touchstone
+from touchstone import command
 
 from . import report
 from .backbone import Backbone, NoNetwork
@@ -61,8 +62,8 @@ def _parse(known: list[Experiment]) -> argparse.Namespace:
                         help="all, or names of experiments")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("training"), help="folder of the report (training)")
     parser.add_argument("--quick", action="store_true", help="small sets and 3 seeds: minutes instead of hours")
-    parser.add_argument("--seeds", type=int, help="repetitions, over which the intervals are (10)")
-    parser.add_argument("--seed", type=int, default=1, help="the first seed (1)")
+    parser.add_argument("--seeds", type=command.whole_number, help="repetitions, over which the intervals are (10)")
+    parser.add_argument("--seed", type=command.whole_number, default=1, help="the first seed (1)")
     parser.add_argument("--server", default="", metavar="HOST:PORT", help="the simulator; without it one is started")
     parser.add_argument("--rig", default="", metavar="HOST:PORT", help="a gateway; without it an emulated rig is started")
     parser.add_argument("--rig-is-real", action="store_true", help="the gateway's arm is one of metal: call its data measured")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
 import shutil
-import sys
-import time
 
 import touchstone
 from touchstone import command
+from touchstone.connection import chosen_targets
+from touchstone.progress import Progress
 
 from .experiment import POSES, worth
 
@@ -31,15 +30,18 @@ def main(words: list[str]) -> None:
         raise touchstone.InvalidRequest(f"{options.figure}: exists already; --force replaces it")
     with contextlib.ExitStack() as stack:
         client = None
-        if options.server:
+        server = chosen_targets(options.server or None)
+        if server is not None:
             for option, given in (("--mesh", options.mesh), ("--mesh-dir", options.mesh_dir)):
                 if given:
-                    raise touchstone.InvalidRequest(f"{option}: works only without --server; give it to touchstone-server instead (the same "
+                    where = "--server" if options.server else "TOUCHSTONE_SERVER (--server none)"
+                    raise touchstone.InvalidRequest(f"{option}: works only without {where}; give it to touchstone-server instead (the same "
                                                     "option there)")
-            client = stack.enter_context(touchstone.connect(options.server))
+            client = stack.enter_context(touchstone.connect(server))
+        progress = stack.enter_context(Progress(options.quiet))
         found = worth(options.set, options.model, options.better, options.train, fitted=options.fitted, meshes=options.mesh,
                       mesh_dirs=options.mesh_dir, client=client, samples=options.samples, touches=options.touches, poses=options.poses,
-                      seeds=options.seeds, seed=options.seed, on_progress=None if options.quiet else _Progress())
+                      seeds=options.seeds, seed=options.seed, on_progress=progress)
     if options.figure:
         from .figure import draw
 
@@ -61,44 +63,16 @@ def _parser() -> command.CommandParser:
         help="Mesh of an object, NAME=FILE[,unit=mm|cm|m|inch][,up=z|y|x]; may be repeated")
     add("--mesh-dir", action="append", default=[], metavar="FOLDER",
         help="Folder of mesh files that bear the names of objects; may be repeated")
-    add("--server", default="", metavar="HOST:PORT", help="A touchstone-server. Default: one is started")
-    add("--samples", type=_whole, default=960, metavar="N", help="Simulated touches of each object in training. Default: 960")
-    add("--touches", type=_whole, default=8, metavar="N", help="Touches that the recogniser sees at once. Default: 8")
+    add("--server", default="", metavar="HOST:PORT", help="A touchstone-server; none: one is started. Default: TOUCHSTONE_SERVER, else none")
+    add("--samples", type=command.whole_number, default=960, metavar="N", help="Simulated touches of each object in training. Default: 960")
+    add("--touches", type=command.whole_number, default=8, metavar="N", help="Touches that the recogniser sees at once. Default: 8")
     add("--poses", default="faces", choices=POSES, help="Where simulated touches go: faces, sphere, or set: the poses of the set that are not "
         "tested. Default: faces")
-    add("--seeds", type=_whole, default=5, metavar="N", help="How often all is simulated and trained anew, from 2. Default: 5")
-    add("--seed", type=_whole, default=1, metavar="N", help="The first of them. Default: 1")
+    add("--seeds", type=command.whole_number, default=5, metavar="N", help="How often all is simulated and trained anew, from 2. Default: 5")
+    add("--seed", type=command.whole_number, default=1, metavar="N", help="The first of them. Default: 1")
     add("--figure", metavar="FILE", help="Draw accuracies and learning curves: .svg, .png or .pdf")
     parser.add_output_options(force=True)
     return parser
-
-
-def _whole(text: str) -> int:
-    """1_000 and 1e3 too."""
-    try:
-        number = float(text.replace("_", ""))
-        if number < 0 or number != int(number):
-            raise ValueError
-    except (ValueError, OverflowError):
-        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from 0 on") from None
-    return int(number)
-
-
-class _Progress:
-    """A line on stderr of what is under way: at most every 2 seconds, every 10 where nobody watches."""
-
-    def __init__(self) -> None:
-        self._begin = self._said = time.monotonic()
-        self._every_s = 2 if sys.stderr.isatty() else 10
-
-    def __call__(self, what: str, share: float) -> None:
-        now = time.monotonic()
-        if now - self._said < self._every_s:
-            return
-        self._said = now
-        passed = now - self._begin
-        left = f", {passed * (1 - share) / share:.0f} s left" if share > 0.05 else ""
-        print(f"{share:4.0%} after {passed:.0f} s{left}  {what}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":
