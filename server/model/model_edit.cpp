@@ -10,6 +10,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/formula_fields.h"
+#include "server/model/own_name.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
@@ -212,9 +213,7 @@ absl::StatusOr<Model> RemoveEffect(const Model& model, const std::string& name) 
   std::vector<std::string> known;
   for (size_t index = 0; index < model.effects.size(); ++index) {
     const Effect& effect = *model.effects[index].effect;
-    const std::string own = effect.formula  ? effect.formula->name
-                            : effect.lookup ? effect.lookup->name
-                                            : effect.name;
+    const std::string& own = OwnName(effect);
     known.push_back(own);
     if (own != name) continue;
     Model result = model;

@@ -1,15 +1,13 @@
 // The live workbench in Debian's chromium, with the real touchstone behind it: TOUCHSTONE_BIN is the program.
-import { spawn, spawnSync } from "node:child_process";
+import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { after, before, test } from "node:test";
 import assert from "node:assert/strict";
 import { join } from "node:path";
 import { launch } from "./chromium.mjs";
+import { errors, fits, program, ready, served, shot, violations } from "./workbench.mjs";
 
-const shots = process.env.TOUCHSTONE_SHOTS;
-const program = process.env.TOUCHSTONE_BIN;
-const axe = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
 let browser;
 let folder;
 before(async () => {
@@ -20,41 +18,6 @@ after(async () => {
   await browser?.close();
   rmSync(folder, { recursive: true });
 });
-
-// `act` gets the page, the process, and what the console said, which must be nothing at the end.
-async function served(options, view, act) {
-  const server = spawn(program, ["workbench", "--renderer", "cpu", ...options], { stdio: ["ignore", "pipe", "ignore"], cwd: folder });
-  const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce", ...view });
-  const said = [];
-  page.on("console", (message) => { if (message.type() === "error" && !/GPU stall|swiftshader/i.test(message.text())) said.push(message.text()); });
-  page.on("pageerror", (error) => said.push(error.stack));
-  try {
-    let printed = "";
-    for await (const piece of server.stdout) {
-      printed += piece;
-      if (printed.includes("\n")) break;
-    }
-    await page.goto(printed.trim());
-    await act(page, server, said);
-    assert.deepEqual(said, []);
-  } finally {
-    await page.close();
-    server.kill("SIGKILL");
-  }
-}
-
-async function violations(page) {
-  await page.evaluate(axe);
-  const found = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
-  return found.violations.map((one) => `${one.id}: ${one.nodes.map((node) => node.html.slice(0, 140)).slice(0, 3).join(" | ")}`);
-}
-const shot = async (page, name) => { if (shots) await page.screenshot({ path: join(shots, `live-${name}.png`) }); };
-const errors = (page) => page.locator(".live-rung").evaluateAll((rungs) => rungs.map((rung) => Number(rung.dataset.rmse)));
-const ready = (page, rungs) => page.waitForFunction((count) => {
-  const shown = [...document.querySelectorAll(".live-rung")].map((rung) => rung.dataset.rmse);
-  return document.querySelector(".live-status")?.textContent === "Up to date." && shown.length === count && !shown.includes("NaN");
-}, rungs);
-const fits = (page) => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
 
 // Clicks as a person does, counted.
 function clicker(page) {
@@ -80,7 +43,7 @@ const timeOfSlider = (page, name, value, at) => page.evaluate(([name, value, at]
 }), [name, value, at]);
 
 test("from an empty page to the missing effect, its values, and a workbench that is killed", async () => {
-  await served([], { colorScheme: "light" }, async (page, server, said) => {
+  await served(browser, folder, [], { colorScheme: "light" }, async (page, server, said) => {
     const person = clicker(page);
     await page.getByRole("button", { name: "Open the example" }).waitFor();
     await shot(page, "empty");
@@ -140,7 +103,7 @@ test("a phone in the dark shows measurements with hostile names", async () => {
   touchstone("model", "new", "--name", "<s>nominal</s>", "-o", "model.yaml");
   touchstone("plan", "lat20", "--plan", "faces", "-o", "plan.csv");
   touchstone("touch", "--plan", "plan.csv", "--model", "model.yaml", "-o", evil);
-  await served([evil, "--model", "model.yaml"], { viewport: { width: 390, height: 844 }, colorScheme: "dark" }, async (page) => {
+  await served(browser, folder, [evil, "--model", "model.yaml"], { viewport: { width: 390, height: 844 }, colorScheme: "dark" }, async (page) => {
     await ready(page, 1);
     assert.equal(await page.locator("img, s").count(), 0);
     assert.equal(await page.locator("script").count(), 2);

@@ -3,6 +3,7 @@ import { computed, signal } from "@preact/signals";
 import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import { startRig } from "./rig";
 import { download } from "../charts/export";
 import { page, session } from "../state";
 
@@ -12,7 +13,7 @@ export interface Model { yaml: string; hash: string; name: string; effects: Mode
 export interface Rung { name: string; model: Model; rmse: number }
 
 export const live = signal(false);
-export const place = signal<{ evidence: boolean; origin: string; source: string } | null>(null);
+export const place = signal<{ evidence: boolean; origin: string; source: string; rig: string; stop_port: number } | null>(null);
 export const origin = signal("");
 export const rungs = signal<Rung[]>([]); // the given model, then one per change
 export const diagnosis = signal<Report | null>(null);
@@ -122,7 +123,7 @@ async function change(of: Record<string, unknown>): Promise<Model> {
 
 const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
 
-async function open(path: string, what: string): Promise<void> {
+async function open(path: string, what: string, keep = false): Promise<void> {
   await doing(what, async (signal) => {
     evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
     let yaml = "";
@@ -130,8 +131,9 @@ async function open(path: string, what: string): Promise<void> {
       if (number === 7) origin.value = text(bytes);
       if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
     }
-    const given = await change({ yaml, change: "none" });
-    saved = given.yaml;
+    // The model of the page stays where there is one: other measurements, the same question.
+    const given = keep && model.value ? model.value : await change({ yaml, change: "none" });
+    if (!keep) saved = given.yaml;
     rungs.value = [{ name: given.name, model: given, rmse: Number.NaN }];
     diagnosis.value = null;
     await compareLast(signal);
@@ -139,6 +141,7 @@ async function open(path: string, what: string): Promise<void> {
 }
 
 export const openExample = () => open("evidence?example", "Making the example");
+export const openRigSet = () => open("evidence?rig", "Comparing", /*keep=*/true);
 
 export const diagnose = () => doing("Looking for what is missing", async (signal) => {
   diagnosis.value = await show(await ask("Diagnose", model.value!.yaml, signal), signal);
@@ -211,5 +214,6 @@ export async function startLive(): Promise<void> {
   token = given ?? sessionStorage.getItem("token") ?? "";
   await doing("Connecting", async (signal) => { place.value = await (await local("state", { signal })).json(); });
   addEventListener("beforeunload", (event) => { if (model.value && model.value.yaml !== saved) event.preventDefault(); });
+  if (place.value?.rig) startRig(token, place.value.stop_port);
   if (place.value?.evidence) await open("evidence", "Comparing");
 }
