@@ -136,7 +136,8 @@ class Cli {
   void AddServerOptions(CLI::App* command, const std::string& what);
   void AddCredentialOptions(CLI::App* command);
   absl::Status CheckWait() const;
-  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServers(std::vector<std::string> servers) const;
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServers(
+      std::vector<std::string> servers) const;
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
 

@@ -114,8 +114,9 @@ absl::Status RunDryRun(const Cli& cli, const DryRunOptions& options) {
   std::vector<size_t> all(rows.size());
   std::iota(all.begin(), all.end(), size_t{0});
   std::vector<v1::TouchCheck> checks;
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRows(rig.connection.get(), all, &rows, options.drawing.empty() ? nullptr : &checks, [] { return !Interrupt::Raised(); }));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig.connection.get(), all, &rows,
+                                       options.drawing.empty() ? nullptr : &checks,
+                                       [] { return !Interrupt::Raised(); }));
 
   if (!options.drawing.empty()) {
     TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.drawing, Drawing(options, state, rows, checks)));

@@ -63,7 +63,8 @@ class Run {
  private:
   // A dry run of what is to be made.
   absl::Status Check(const std::vector<size_t>& wanted) {
-    TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig_.connection.get(), wanted, &rows_, nullptr, [] { return !Interrupt::Raised(); }));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        CheckRows(rig_.connection.get(), wanted, &rows_, nullptr, [] { return !Interrupt::Raised(); }));
     for (const PlannedRow& row : rows_) impossible_ += !row.possible;
     if (impossible_ == 0) return absl::OkStatus();
     cli_.Log(ImpossibleTable(rows_, kMaxRefusalsShown));

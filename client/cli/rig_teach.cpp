@@ -106,7 +106,7 @@ bool Obey(const std::string& line, const TeachOptions& options, const v1::GuideS
   }
   const absl::StatusOr<client::MeasuredTouch> touch =
       client::TaughtTouch(now, taught->size(), options.standoff_mm * kMetresPerMillimetre,
-                  options.speed_mm_s * kMetresPerMillimetre);
+                          options.speed_mm_s * kMetresPerMillimetre);
   if (!touch.ok()) {
     std::fprintf(stderr, "not kept: %s\n", std::string(touch.status().message()).c_str());
     return true;

@@ -21,8 +21,8 @@ void Add(const v1::PlanDraws& more, v1::PlanDraws* draws) {
 
 }  // namespace
 
-absl::StatusOr<PlannedTouches> ExpandPlan(Connection* connection, const std::vector<std::string>& objects, uint64_t first,
-                                          uint64_t count, v1::ExpandPlanRequest request) {
+absl::StatusOr<PlannedTouches> ExpandPlan(Connection* connection, const std::vector<std::string>& objects,
+                                          uint64_t first, uint64_t count, v1::ExpandPlanRequest request) {
   PlannedTouches planned;
   for (const std::string& object : objects) {
     request.set_object(object);

@@ -23,7 +23,7 @@ struct PlannedTouches {
 
 // Touches first .. first + count - 1 of the plan in `request` for each object in turn; their numbers begin at `first`. A plan
 // that ends sooner gives fewer. `request` names no object and no part.
-absl::StatusOr<PlannedTouches> ExpandPlan(Connection* connection, const std::vector<std::string>& objects, uint64_t first,
-                                          uint64_t count, v1::ExpandPlanRequest request);
+absl::StatusOr<PlannedTouches> ExpandPlan(Connection* connection, const std::vector<std::string>& objects,
+                                          uint64_t first, uint64_t count, v1::ExpandPlanRequest request);
 
 }  // namespace touchstone::client

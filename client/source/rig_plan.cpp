@@ -72,7 +72,8 @@ absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<MeasuredTouch>&
 }
 
 absl::Status CheckRows(Connection* connection, const std::vector<size_t>& wanted,
-                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks, const std::function<bool()>& go_on) {
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks,
+                       const std::function<bool()>& go_on) {
   for (size_t first = 0; first < wanted.size();) {
     v1::CheckTouchesRequest request;
     request.set_object((*rows)[wanted[first]].touch.object);
@@ -109,8 +110,8 @@ std::string RestingFaceRequest(const std::string& object, const std::string& up_
   return absl::StrCat("Put ", object, " on the fixture with its face ", up_face, " up");
 }
 
-absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
-                                                  double standoff_m, double speed_m_s) {
+absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number, double standoff_m,
+                                          double speed_m_s) {
   if (state.object().empty() || !state.has_object_from_tip())
     return absl::FailedPreconditionError(
         "what lies on the fixture is unknown, or the calibration has no pose of it: touchstone rig mount "

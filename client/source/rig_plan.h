@@ -43,8 +43,9 @@ absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<MeasuredTouch>&
 
 // Checks the rows that `wanted` names (indices), in parts, and fills in what the source says; each row's check, with its path,
 // goes to `checks` (may be null). `go_on` is asked between two parts (may be null): CANCELLED where it says no.
-absl::Status CheckRows(Connection* connection, const std::vector<size_t>& wanted, std::vector<PlannedRow>* rows,
-                       std::vector<v1::TouchCheck>* checks, const std::function<bool()>& go_on = nullptr);
+absl::Status CheckRows(Connection* connection, const std::vector<size_t>& wanted,
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks,
+                       const std::function<bool()>& go_on = nullptr);
 
 // "Put lat20 on the fixture with its face -x up", or where it lies there already, "Turn lat20 so that its
 // face -x points up".
@@ -53,8 +54,8 @@ std::string RestingFaceRequest(const std::string& object, const std::string& up_
 
 // The touch whose contact a guided arm shows: its tip is the target, its axis the approach. FAILED_PRECONDITION without an
 // object on the fixture.
-absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
-                                                  double standoff_m, double speed_m_s);
+absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number, double standoff_m,
+                                          double speed_m_s);
 
 // The standard deviation of one finger's contact time among repeats of the same touch, seconds: what no pose
 // explains. Only whole touches count. NaN without repeats.

@@ -23,11 +23,11 @@ absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach, 
   std::string head(page.substr(0, mark));
   if (reach == PageReach::kOwnOrigin)
     absl::StrReplaceAll(
-        {{"default-src 'none';",
-          absl::StrCat("default-src 'none'; connect-src 'self'",
-                       stop_port == 0 ? ""
-                                      : absl::StrCat(" http://127.0.0.1:", stop_port, " http://localhost:", stop_port),
-                       ";")}},
+        {{"default-src 'none';", absl::StrCat("default-src 'none'; connect-src 'self'",
+                                              stop_port == 0 ? ""
+                                                             : absl::StrCat(" http://127.0.0.1:", stop_port,
+                                                                            " http://localhost:", stop_port),
+                                              ";")}},
         &head);
   // "</script>" in a name must not end the element.
   return absl::StrCat(head, absl::StrReplaceAll(EscapeInJson(json), {{"<", "\\u003c"}, {">", "\\u003e"}}),

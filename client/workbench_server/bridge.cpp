@@ -108,7 +108,8 @@ class Call : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> 
     upstream_->FindAnother(server_, [upstream = upstream_, exchange = exchange_, timeout = timeout_,
                                      left = servers_left_ - 1](const absl::Status& found) {
       const absl::StatusOr<absl::string_view> message = OneMessage(exchange->request().body());
-      if (!found.ok() || !message.ok()) return ReplyNoCall(exchange.get(), found.ok() ? message.status() : found);
+      if (!found.ok() || !message.ok())
+        return ReplyNoCall(exchange.get(), found.ok() ? message.status() : found);
       (new Call(upstream, exchange, left))->Start(*message, timeout);
     });
     delete this;

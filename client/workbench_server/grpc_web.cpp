@@ -18,7 +18,7 @@
 namespace touchstone::workbench {
 namespace {
 
-constexpr size_t kHeadBytes = 5;  // flags, and the length in network order
+constexpr size_t kHeadBytes = 5;   // flags, and the length in network order
 constexpr size_t kMaxShown = 100;  // of a path, in a message
 constexpr uint8_t kCompressed = 0x01, kTrailers = 0x80;
 
@@ -119,10 +119,10 @@ absl::Status CheckMethod(absl::string_view path) {
   if (!role.has_value())
     return absl::UnimplementedError(absl::StrCat(Printable(path, kMaxShown), " is no method of Touchstone"));
   if (*role <= service::Role::kReader) return absl::OkStatus();
-  return absl::PermissionDeniedError(absl::StrCat(
-      path, " needs the role ", service::RoleName(*role),
-      ", and the page calls as a reader: what moves a rig goes through its view Touch (--rig), and what changes what a "
-      "server keeps through the command line"));
+  return absl::PermissionDeniedError(absl::StrCat(path, " needs the role ", service::RoleName(*role),
+                                                  ", and the page calls as a reader: what moves a rig goes "
+                                                  "through its view Touch (--rig), and what changes what a "
+                                                  "server keeps through the command line"));
 }
 
 }  // namespace touchstone::workbench

@@ -50,8 +50,8 @@ absl::Status SetFormula(const std::vector<std::string>& assignments, model::Effe
     const auto found = std::find_if(parameters.begin(), parameters.end(),
                                     [&](const model::ParameterInfo& one) { return one.name == name; });
     if (equals == std::string::npos || found == parameters.end())
-      return absl::InvalidArgumentError(absl::StrCat("'", assignment, "': the formula '", model::OwnName(*formula->effect),
-                                                     "' has no such parameter"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "'", assignment, "': the formula '", model::OwnName(*formula->effect), "' has no such parameter"));
     TOUCHSTONE_ASSIGN_OR_RETURN(const double value, ParseNumber(assignment.substr(equals + 1)));
     formula->values[found - parameters.begin()] = ToSi(found->unit, value);
   }
@@ -76,7 +76,8 @@ absl::StatusOr<model::Model> Changed(const json& request) {
     return absl::InvalidArgumentError(
         absl::StrCat("change = '", change, "'; none, take, set, formula or remove was expected"));
   if (const auto there = Find(&model, effect); there != model.effects.end() && there->effect->formula) {
-    TOUCHSTONE_RETURN_IF_ERROR(SetFormula(request.at("assignments").get<std::vector<std::string>>(), &*there));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        SetFormula(request.at("assignments").get<std::vector<std::string>>(), &*there));
     return model;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(

@@ -60,7 +60,8 @@ absl::Status CheckOrigin(const boost::beast::http::fields& head, bool page) {
   if (origin != head.end() && Text(origin->value()) != "http://" + host)
     return OtherPage(absl::StrCat("a page of '", Shown(Text(origin->value())), "' asks"), host);
   const std::string site = Text(head["Sec-Fetch-Site"]);
-  const bool opened = page && Text(head["Sec-Fetch-Mode"]) == "navigate" && Text(head["Sec-Fetch-Dest"]) == "document";
+  const bool opened =
+      page && Text(head["Sec-Fetch-Mode"]) == "navigate" && Text(head["Sec-Fetch-Dest"]) == "document";
   if (!site.empty() && site != "same-origin" && site != "none" && !opened)
     return OtherPage(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site), ")"), host);
   return absl::OkStatus();
@@ -75,7 +76,8 @@ absl::Status CheckOriginBesidePage(const boost::beast::http::fields& head) {
     return OtherPage(absl::StrCat("a page of '", Shown(origin), "' asks"), WithoutPort(host));
   const std::string site = Text(head["Sec-Fetch-Site"]);
   if (!site.empty() && site != "same-origin" && site != "same-site")
-    return OtherPage(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site), ")"), WithoutPort(host));
+    return OtherPage(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site), ")"),
+                     WithoutPort(host));
   return absl::OkStatus();
 }
 

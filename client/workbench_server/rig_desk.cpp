@@ -18,9 +18,8 @@ constexpr std::chrono::seconds kStopAnswer{2}, kExportAnswer{30};
 constexpr size_t kMaxPageId = 64, kMaxPages = 1000, kMaxReason = 300;
 
 bool IsPageId(const std::string& text) {
-  return !text.empty() && text.size() <= kMaxPageId && std::all_of(text.begin(), text.end(), [](char c) {
-    return absl::ascii_isalnum(c) || c == '-';
-  });
+  return !text.empty() && text.size() <= kMaxPageId &&
+         std::all_of(text.begin(), text.end(), [](char c) { return absl::ascii_isalnum(c) || c == '-'; });
 }
 
 }  // namespace
@@ -30,9 +29,9 @@ absl::StatusOr<std::unique_ptr<RigDesk>> RigDesk::Open(std::unique_ptr<client::C
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::DescribeResponse source,
                               rig->Call(&v1::Source::Stub::Describe, v1::DescribeRequest()));
   if (source.kind() != v1::SOURCE_KIND_PHYSICAL)
-    return absl::FailedPreconditionError(absl::StrCat("--rig: ", rig->address(), " is a ",
-                                                      client::SourceKindName(source.kind()),
-                                                      " source, which has no rig; a touchstone-gateway was expected"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("--rig: ", rig->address(), " is a ", client::SourceKindName(source.kind()),
+                     " source, which has no rig; a touchstone-gateway was expected"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
                               rig->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
   std::vector<std::string> objects;
@@ -81,7 +80,8 @@ absl::Status RigDesk::Act(const std::string& request) {
   absl::Status status;
   try {
     const std::string page = parsed.at("page");
-    if (!IsPageId(page)) return absl::InvalidArgumentError("page: 1 to 64 letters, digits and dashes were expected");
+    if (!IsPageId(page))
+      return absl::InvalidArgumentError("page: 1 to 64 letters, digits and dashes were expected");
     const std::lock_guard<std::mutex> lock(mutex_);
     if (pages_.count(page) == 0 && pages_.size() >= kMaxPages)
       return absl::ResourceExhaustedError("there were 1000 pages; start touchstone workbench again");
@@ -96,9 +96,9 @@ absl::Status RigDesk::Act(const std::string& request) {
 
 absl::Status RigDesk::CheckControls(const std::string& page) const {
   if (controller_ == page && source_ != nullptr) return absl::OkStatus();
-  return absl::FailedPreconditionError(controller_.empty()
-                                           ? std::string("no page controls the rig; take control first")
-                                           : absl::StrCat(Named(controller_), " controls the rig; ask it for control"));
+  return absl::FailedPreconditionError(
+      controller_.empty() ? std::string("no page controls the rig; take control first")
+                          : absl::StrCat(Named(controller_), " controls the rig; ask it for control"));
 }
 
 absl::Status RigDesk::CheckConfirmed(const Json& request) const {
@@ -171,10 +171,13 @@ absl::Status RigDesk::ActLocked(const std::string& page, const std::string& act,
   if (act == "power_on")
     return BeginJob("powering the arm on", true, [this] { return source_->PowerOn().status(); });
   if (act == "home") return BeginJob("going home", true, [this] { return source_->Home().status(); });
-  if (act != "start") return absl::InvalidArgumentError(absl::StrCat("act: '", Printable(act, kMaxPageId), "' is unknown"));
+  if (act != "start")
+    return absl::InvalidArgumentError(absl::StrCat("act: '", Printable(act, kMaxPageId), "' is unknown"));
   if (run_ == nullptr || request.at("check") != check_)
-    return absl::FailedPreconditionError("this is not the plan that was checked last; make the dry run again");
-  return BeginJob("touching", true, [this, skip = request.value("skip_impossible", false)] { return RunTouches(skip); });
+    return absl::FailedPreconditionError(
+        "this is not the plan that was checked last; make the dry run again");
+  return BeginJob("touching", true,
+                  [this, skip = request.value("skip_impossible", false)] { return RunTouches(skip); });
 }
 
 // Control between pages.
@@ -192,8 +195,8 @@ absl::Status RigDesk::Between(const std::string& page, const std::string& act, c
     return absl::OkStatus();
   }
   if (!job_.name.empty())
-    return absl::FailedPreconditionError(
-        absl::StrCat("control does not change hands while the rig is at work (", job_.name, "); stop it, or wait"));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "control does not change hands while the rig is at work (", job_.name, "); stop it, or wait"));
   if (act == "release") return BeginJob("giving the lease back", false, [this] { return Drop(); });
   const std::string to = act == "take" ? page : request.at("to").get<std::string>();
   if (pages_.count(to) == 0) return absl::NotFoundError("to: there is no such page");
@@ -208,15 +211,17 @@ absl::Status RigDesk::Acquire(const std::string& page, bool take) {
   client::LeasedSourceOptions options;
   options.take_lease = take;
   options.log = log_;
-  absl::StatusOr<std::unique_ptr<client::LeasedSource>> source = client::LeasedSource::Open(rig_.get(), std::move(options));
+  absl::StatusOr<std::unique_ptr<client::LeasedSource>> source =
+      client::LeasedSource::Open(rig_.get(), std::move(options));
   if (absl::IsFailedPrecondition(source.status())) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kStopAnswer);
     v1::State state;
     if (control_->GetState(&context, v1::GetStateRequest(), &state).ok() && !state.lease_holder().empty())
       return absl::FailedPreconditionError(
-          absl::StrCat("'", state.lease_holder(), "' holds the lease of this rig: wait until they are done, or agree "
-                                                  "with them and take it"));
+          absl::StrCat("'", state.lease_holder(),
+                       "' holds the lease of this rig: wait until they are done, or agree "
+                       "with them and take it"));
   }
   TOUCHSTONE_RETURN_IF_ERROR(source.status());
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -288,7 +293,9 @@ absl::Status RigDesk::AskPerson(const std::string& words) {
 absl::StatusOr<std::string> RigDesk::Stop(const std::string& request) {
   const Json parsed = Json::parse(request, nullptr, /*allow_exceptions=*/false);
   const auto text = [&](const char* name) {
-    return parsed.is_object() && parsed.contains(name) && parsed[name].is_string() ? parsed[name].get<std::string>() : "";
+    return parsed.is_object() && parsed.contains(name) && parsed[name].is_string()
+               ? parsed[name].get<std::string>()
+               : "";
   };
   const std::string press = text("press");
   {
@@ -296,7 +303,8 @@ absl::StatusOr<std::string> RigDesk::Stop(const std::string& request) {
     stopping_ = true;
     // Sent by two ways; the first to come stops the rig, and both have its answer.
     if (!press.empty() && press == press_) {
-      changed_.wait_for(lock, kStopAnswer, [&] { return press != press_ || !press_answer_.ok() || !press_answer_->empty(); });
+      changed_.wait_for(lock, kStopAnswer,
+                        [&] { return press != press_ || !press_answer_.ok() || !press_answer_->empty(); });
       return press_answer_;
     }
     press_ = press;
@@ -310,9 +318,8 @@ absl::StatusOr<std::string> RigDesk::Stop(const std::string& request) {
   stop.set_holder(client::LeaseHolder());
   v1::StopResponse response;
   const absl::Status sent = client::FromGrpc(control_->Stop(&context, stop, &response));
-  absl::StatusOr<std::string> answer =
-      absl::UnavailableError(absl::StrCat("THE STOP DID NOT REACH THE RIG: ", sent.message(),
-                                          ". Press the emergency stop if anything moves"));
+  absl::StatusOr<std::string> answer = absl::UnavailableError(absl::StrCat(
+      "THE STOP DID NOT REACH THE RIG: ", sent.message(), ". Press the emergency stop if anything moves"));
   if (sent.ok())
     answer = Json{{"aborted_touches", response.aborted_touches()},
                   {"standstill", response.standstill()},
@@ -355,7 +362,8 @@ absl::StatusOr<v1::Evidence> RigDesk::Evidence() {
   TOUCHSTONE_ASSIGN_OR_RETURN(*evidence.mutable_csv(), SetCsv());
   const std::lock_guard<std::mutex> lock(mutex_);
   evidence.set_origin(absl::StrCat("session ", run_->session(), " of ", address_));
-  model::Model nominal = model::NominalModel(rig_json_.value("fingers", 3), rig_json_.value("spacing_m", 0.03));
+  model::Model nominal =
+      model::NominalModel(rig_json_.value("fingers", 3), rig_json_.value("spacing_m", 0.03));
   nominal.name = "nominal";
   evidence.mutable_model()->set_yaml(model::FormatModel(nominal));
   return evidence;

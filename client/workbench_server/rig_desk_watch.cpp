@@ -32,9 +32,10 @@ json RigJson(const v1::State& state, const v1::RigState& rig) {
           {"object", rig.object()},
           {"up_face", client::UpFaceWord(rig.up_face())},
           {"mounts_itself", rig.mounts_itself()},
-          {"arm", rig.arm().connected() ? absl::StrCat(rig.arm().model(), ", ", client::RobotModeWord(rig.arm().robot_mode()),
-                                                       ", safety ", client::SafetyModeWord(rig.arm().safety_mode()))
-                                        : std::string("not connected")},
+          {"arm", rig.arm().connected()
+                      ? absl::StrCat(rig.arm().model(), ", ", client::RobotModeWord(rig.arm().robot_mode()),
+                                     ", safety ", client::SafetyModeWord(rig.arm().safety_mode()))
+                      : std::string("not connected")},
           {"powered", rig.arm().robot_mode() == v1::ROBOT_MODE_RUNNING},
           {"phase", client::MotionPhaseWord(rig.arm().phase())},
           {"tip_mm", {tenths_mm(tip.x()), tenths_mm(tip.y()), tenths_mm(tip.z())}},
@@ -68,7 +69,9 @@ json RigDesk::LookAtRig() {
 void RigDesk::Look() {
   std::unique_lock<std::mutex> lock(mutex_);
   for (int looks = 0; !ending_; ++looks) {
-    changed_.wait(lock, [this] { return ending_ || !job_.name.empty() || source_ != nullptr || watchers_->count() > 0; });
+    changed_.wait(lock, [this] {
+      return ending_ || !job_.name.empty() || source_ != nullptr || watchers_->count() > 0;
+    });
     if (ending_) return;
     lock.unlock();
     json now = LookAtRig();
@@ -107,7 +110,8 @@ void RigDesk::Work() {
     const absl::Status status = run();
     lock.lock();
     if (!status.ok())
-      last_error_ = stopping_ && absl::IsCancelled(status) ? std::string("stopped") : std::string(status.message());
+      last_error_ =
+          stopping_ && absl::IsCancelled(status) ? std::string("stopped") : std::string(status.message());
     else if (last_text_.empty())
       last_text_ = job_.name + ": done";
     job_ = {};

@@ -31,11 +31,13 @@ absl::StatusOr<std::vector<client::MeasuredTouch>> ExpandFaces(client::Connectio
   faces->set_rounds(plan.at("rounds").get<uint32_t>());
   if (plan.contains("max_tilt_deg"))
     faces->set_max_tilt_rad(ToSi(Unit::kDegree, plan.at("max_tilt_deg").get<double>()));
-  request.mutable_plan()->set_speed_m_s(ToSi(Unit::kMillimetrePerSecond, plan.at("speed_mm_s").get<double>()));
+  request.mutable_plan()->set_speed_m_s(
+      ToSi(Unit::kMillimetrePerSecond, plan.at("speed_mm_s").get<double>()));
   request.set_seed(plan.value("seed", uint64_t{0}));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       client::PlannedTouches planned,
-      client::ExpandPlan(rig, objects, 0, uint64_t{kFaces} * faces->samples_per_face() * faces->rounds(), request));
+      client::ExpandPlan(rig, objects, 0, uint64_t{kFaces} * faces->samples_per_face() * faces->rounds(),
+                         request));
   return std::move(planned.touches);
 }
 
@@ -46,7 +48,10 @@ json TouchJson(const client::PlannedRow& row, const v1::TouchResult& result) {
   json times = json::array();
   for (const double time_s : result.contact_time_s())
     times.push_back(std::isfinite(time_s) ? json(Microseconds(time_s - first)) : json());
-  return {{"touch", row.touch.touch}, {"object", row.touch.object}, {"up_face", row.up_face}, {"times_us", times}};
+  return {{"touch", row.touch.touch},
+          {"object", row.touch.object},
+          {"up_face", row.up_face},
+          {"times_us", times}};
 }
 
 }  // namespace
@@ -59,7 +64,8 @@ absl::StatusOr<std::unique_ptr<TouchRun>> TouchRun::Check(client::Connection* ri
   std::vector<client::MeasuredTouch> touches;
   if (plan.contains("csv")) {
     run->origin_ = plan.value("origin", "the plan");
-    TOUCHSTONE_ASSIGN_OR_RETURN(touches, client::ParseMeasurements(plan.at("csv").get<std::string>(), run->origin_));
+    TOUCHSTONE_ASSIGN_OR_RETURN(touches,
+                                client::ParseMeasurements(plan.at("csv").get<std::string>(), run->origin_));
   } else {
     run->origin_ = "the plan";
     TOUCHSTONE_ASSIGN_OR_RETURN(touches, ExpandFaces(rig, plan));
@@ -69,7 +75,8 @@ absl::StatusOr<std::unique_ptr<TouchRun>> TouchRun::Check(client::Connection* ri
   std::vector<size_t> all(run->rows_.size());
   std::iota(all.begin(), all.end(), size_t{0});
   TOUCHSTONE_RETURN_IF_ERROR(client::CheckRows(rig, all, &run->rows_, nullptr, go_on));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, rig->CallOnce(&v1::Rig::Stub::GetRig, v1::GetRigRequest()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state,
+                              rig->CallOnce(&v1::Rig::Stub::GetRig, v1::GetRigRequest()));
   run->Summarize(state);
   return run;
 }
@@ -81,9 +88,11 @@ void TouchRun::Summarize(const v1::RigState& state) {
   for (const client::PlannedRow& row : rows_) {
     possible += row.possible;
     if (!row.possible && impossible.size() < kMaxReasonsShown)
-      impossible.push_back({{"touch", row.touch.touch}, {"object", row.touch.object}, {"reason", row.reason}});
+      impossible.push_back(
+          {{"touch", row.touch.touch}, {"object", row.touch.object}, {"reason", row.reason}});
     for (const std::string& note : row.notes)
-      if (notes.size() < kMaxReasonsShown) notes.push_back(absl::StrCat("Touch ", row.touch.touch, ": ", note));
+      if (notes.size() < kMaxReasonsShown)
+        notes.push_back(absl::StrCat("Touch ", row.touch.touch, ": ", note));
   }
   for (const client::RigGroup& group : client::GroupRows(
            rows_, [this](size_t row) { return rows_[row].possible; }, state.object(),
@@ -94,8 +103,9 @@ void TouchRun::Summarize(const v1::RigState& state) {
                       {"duration_s", group.duration_s}});
     duration_s += group.duration_s;
   }
-  checked_ = {{"session", session_},     {"origin", origin_},         {"touches", rows_.size()}, {"possible", possible},
-              {"groups", groups},        {"duration_s", duration_s},  {"impossible", impossible}, {"notes", notes}};
+  checked_ = {{"session", session_},      {"origin", origin_}, {"touches", rows_.size()},
+              {"possible", possible},     {"groups", groups},  {"duration_s", duration_s},
+              {"impossible", impossible}, {"notes", notes}};
 }
 
 absl::Status TouchRun::TouchAll(client::Connection* rig, client::LeasedSource* source, bool skip_impossible,
@@ -108,7 +118,8 @@ absl::Status TouchRun::TouchAll(client::Connection* rig, client::LeasedSource* s
   const auto look = [&] { return rig->CallOnce(&v1::Rig::Stub::GetRig, v1::GetRigRequest()); };
   TOUCHSTONE_ASSIGN_OR_RETURN(v1::RigState state, look());
   const std::vector<client::RigGroup> groups = client::GroupRows(
-      rows_, [this](size_t row) { return rows_[row].possible; }, state.object(), client::UpFaceWord(state.up_face()));
+      rows_, [this](size_t row) { return rows_[row].possible; }, state.object(),
+      client::UpFaceWord(state.up_face()));
   for (const client::RigGroup& group : groups) {
     TOUCHSTONE_ASSIGN_OR_RETURN(state, look());
     if (state.object() != group.object || client::UpFaceWord(state.up_face()) != group.up_face) {
@@ -128,8 +139,9 @@ absl::Status TouchRun::TouchAll(client::Connection* rig, client::LeasedSource* s
       request.add_touch_ids(row.id);
       const absl::StatusOr<v1::TouchResponse> response = source->Touch(request);
       if (!response.ok())
-        return absl::Status(response.status().code(), absl::StrCat("touch ", row.touch.touch, " of ", row.touch.object,
-                                                                   ": ", response.status().message()));
+        return absl::Status(response.status().code(),
+                            absl::StrCat("touch ", row.touch.touch, " of ", row.touch.object, ": ",
+                                         response.status().message()));
       events.touched(TouchJson(row, response->results(0)).dump());
     }
   }

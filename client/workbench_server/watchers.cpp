@@ -74,7 +74,8 @@ void Watchers::Pump(const std::shared_ptr<Watcher>& watcher) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (watcher->writing || watcher->gone || watcher->version == version_) return;
     if (watcher->list != list_) watcher->items = 0;
-    line = absl::StrCat("{\"state\":", state_, ",\"list\":", list_, ",\"first\":", watcher->items, ",\"items\":[");
+    line = absl::StrCat("{\"state\":", state_, ",\"list\":", list_, ",\"first\":", watcher->items,
+                        ",\"items\":[");
     for (size_t i = watcher->items; i < items_.size(); ++i)
       absl::StrAppend(&line, i > watcher->items ? "," : "", items_[i]);
     line += "]}\n";

@@ -1,5 +1,6 @@
 #include "client/workbench_server/workbench.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <nlohmann/json.hpp>
 
@@ -45,8 +46,9 @@ absl::Status Workbench::Listen() {
     stop.beside_page = true;
     stop.open_path.clear();
     stop.limits.body_bytes = stop.limits.head_bytes;
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        stop_http_, HttpServer::Start(std::move(stop), [this](const auto& exchange) { AnswerStop(exchange); }));
+    TOUCHSTONE_ASSIGN_OR_RETURN(stop_http_, HttpServer::Start(std::move(stop), [this](const auto& exchange) {
+                                  AnswerStop(exchange);
+                                }));
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(page_, FilledPage("{\"live\":true}", PageReach::kOwnOrigin, stop_port()));
   served.port = options_.port;
@@ -95,6 +97,10 @@ void Workbench::AnswerStop(const std::shared_ptr<Exchange>& exchange) const {
 
 absl::StatusOr<std::string> Workbench::OfRig(const HttpRequest& request, std::string* type) const {
   const bool post = request.method() == http::verb::post;
+  const absl::string_view target(request.target().data(), request.target().size());
+  const bool of_rig = absl::StartsWith(target, "/local/rig") || target == "/local/stop" ||
+                      target == "/local/watch" || target == "/local/evidence?rig";
+  if (!of_rig) return absl::NotFoundError("there is nothing here; the page is at /");
   if (desk_ == nullptr)
     return absl::FailedPreconditionError("touchstone workbench was started without a rig (--rig HOST:PORT)");
   if (post && request.target() == "/local/stop") return desk_->Stop(request.body());

@@ -26,10 +26,12 @@ namespace touchstone::workbench {
 
 struct WorkbenchOptions {
   int port = 0;
-  client::Connection* connection = nullptr;  // whom the page asks; outlives the workbench, which uses it alone
-  std::unique_ptr<client::Connection> rig;   // a gateway's; null: the page has no rig
-  std::function<void(const std::string&)> log = [](const std::string&) {};  // of the rig's stops and losses, for people
-  std::optional<v1::Evidence> evidence;    // with the model as text
+  client::Connection* connection =
+      nullptr;                              // whom the page asks; outlives the workbench, which uses it alone
+  std::unique_ptr<client::Connection> rig;  // a gateway's; null: the page has no rig
+  std::function<void(const std::string&)> log = [](const std::string&) {
+  };                                     // of the rig's stops and losses, for people
+  std::optional<v1::Evidence> evidence;  // with the model as text
   HttpLimits limits;
 };
 

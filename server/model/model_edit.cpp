@@ -10,9 +10,9 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/formula_fields.h"
-#include "server/model/own_name.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
+#include "server/model/own_name.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
 

@@ -7,7 +7,7 @@ import { Explore } from "./views/explore";
 import { Commands, Head } from "./views/head";
 import { Ladder } from "./views/ladder";
 import { Live } from "./views/live";
-import { place, stale } from "./data/live";
+import { place, rungs, stale } from "./data/live";
 import { Photographs } from "./views/photographs";
 import { Power } from "./views/power";
 import { Data, Distributions, Methods, Next, Provenance } from "./views/rest";
@@ -70,7 +70,7 @@ export function LiveApp() {
   return (
     <>
       {place.value?.rig && <RigBar />}
-      <div class="live-main" role={page.value ? "region" : "main"} aria-label="Workbench"><Live />{place.value?.rig && <Touch />}</div>
+      <div class={`live-main${place.value?.rig && !rungs.value.length ? " unopened" : ""}`} role={page.value ? "region" : "main"} aria-label="Workbench"><Live />{place.value?.rig && <Touch />}</div>
       {page.value && <div class={stale.value ? "stale" : undefined}><App /></div>}
     </>
   );

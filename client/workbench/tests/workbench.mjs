@@ -9,8 +9,8 @@ const shots = process.env.TOUCHSTONE_SHOTS;
 const axe = readFileSync(new URL("../node_modules/axe-core/axe.min.js", import.meta.url), "utf8");
 
 // Starts a program and waits for its first line; `name` lies beside touchstone.
-export async function started(name, args, cwd) {
-  const child = spawn(join(dirname(program), name), args, { stdio: ["ignore", "pipe", "ignore"], cwd });
+export async function started(name, args, cwd, env = process.env) {
+  const child = spawn(join(dirname(program), name), args, { stdio: ["ignore", "pipe", "ignore"], cwd, env });
   let printed = "";
   for await (const piece of child.stdout) {
     printed += piece;
