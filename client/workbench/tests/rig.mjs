@@ -1,11 +1,12 @@
 // The view Touch in Debian's chromium, with the emulated rig behind a real gateway.
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { after, before, test } from "node:test";
 import assert from "node:assert/strict";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { launch } from "./chromium.mjs";
-import { ended, fits, listen, ready, served, shot, started, violations } from "./workbench.mjs";
+import { ended, fits, program, ready, served, shot, started, violations } from "./workbench.mjs";
 
 let browser;
 let folder;
@@ -106,8 +107,10 @@ test("Stop of a spectator is answered within 200 ms with ten pages open, while e
     // Every page holds a connection with a call that does not end.
     for (const other of others) await other.evaluate(() => { for (let i = 0; i < 4; ++i) void fetch("/local/watch", { headers: { "x-touchstone-token": sessionStorage.getItem("token") } }).catch(() => undefined); });
     await button(last, "Stop").click();
-    await last.locator(".rig-pressed").filter({ hasText: "Stopped; nothing moves." }).waitFor();
-    const ms = Number(/after (\d+) ms/.exec(await last.locator(".rig-pressed").innerText())[1]);
+    await last.locator(".rig-pressed").filter({ hasNotText: "Stopping" }).waitFor();
+    const answer = await last.locator(".rig-pressed").innerText();
+    assert.match(answer, /Stopped; nothing moves\./);
+    const ms = Number(/after (\d+) ms/.exec(answer)[1]);
     console.log(`Stop is answered after ${ms} ms with ten pages open and all connections taken`);
     assert.ok(ms <= 200, `${ms} ms`);
     await shot(last, "touch-stopped");
@@ -143,6 +146,56 @@ test("control is asked for, handed over, and stays with a page that is loaded ag
     await other.getByText("You control the rig.", { exact: true }).waitFor();
     await other.close();
   });
+});
+
+test("the lease of another program is taken on purpose alone, and its page says who took it", async () => {
+  await served(browser, folder, ["--rig", address()], {}, async (page) => {
+    await button(page, "Take control").click();
+    await page.getByText("You control the rig.", { exact: true }).waitFor();
+    await served(browser, folder, ["--rig", address()], {}, async (other) => {
+      await other.getByText(/ holds the rig.s lease\./).waitFor();
+      assert.equal(await button(other, "Take control").count(), 0);
+      await button(other, "Take the lease from them").click();
+      await other.getByText("You control the rig.", { exact: true }).waitFor();
+      await page.getByText(/ took the lease/).waitFor();
+      await page.getByText(/ holds the rig.s lease\./).waitFor();
+    });
+  });
+});
+
+test("where a person changes the object the page asks, and the arm waits until somebody has agreed", async () => {
+  const own = mkdtempSync(join(tmpdir(), "touchstone-hands-"));
+  const rig = await started("touchstone-rig-emulator", ["--dir", join(own, "rig"), "--speedup", "20", "--finger-give-mm", "1000", "--no-camera", "--seed", "8"], own);
+  const config = rig.line.split(" ").pop();
+  writeFileSync(config, readFileSync(config, "utf8").replace(/^mount_command.*$/m, ""));
+  const control = JSON.parse(readFileSync(join(own, "rig", "emulator.json"), "utf8")).control.port;
+  const hands = await started("touchstone-gateway", ["--config", config, "--listen", "127.0.0.1:0"], own);
+  try {
+    await served(browser, own, ["--rig", hands.line.split(" ").pop()], { colorScheme: "dark" }, async (page) => {
+      await button(page, "Take control").click();
+      await page.getByText("You control the rig.", { exact: true }).waitFor();
+      await plan(page, "hands", 1, 1);
+      await agree(page, "Start \u2026");
+      const asked = page.locator("#touch .warnings p");
+      await asked.filter({ hasText: "Put lat20 on the fixture" }).waitFor();
+      assert.equal(await page.locator("#touch h3", { hasText: "Measured" }).count(), 0);
+      await shot(page, "touch-asked");
+      assert.deepEqual(await violations(page), []);
+      const face = /face ([+-][xyz])/.exec(await asked.innerText())[1];
+      const said = spawnSync(join(dirname(program), "touchstone-rig-emulator"), ["tell", `127.0.0.1:${control}`, "mount", "lat20", face]);
+      assert.equal(said.status, 0, String(said.stderr));
+      await agree(page, "It lies there \u2026");
+      await touches(page, 1);
+      // The next face: Stop while the page asks ends the run.
+      await asked.filter({ hasText: "Turn lat20" }).waitFor();
+      await button(page, "Stop").click();
+      await asked.filter({ hasText: "Stopped" }).waitFor();
+      await page.waitForFunction(() => !document.querySelector(".rig-job"));
+    });
+  } finally {
+    for (const one of [hands, rig]) { one.child.kill("SIGTERM"); await ended(one.child); }
+    rmSync(own, { recursive: true });
+  }
 });
 
 test("a page without a workbench says so, and the rig without one stops", async () => {

@@ -41,6 +41,7 @@ export const asksAlready = computed(() => desk.value?.requests.includes(me) ?? f
 
 const silentAfterMs = 3000; // the workbench says something every second
 const againAfterMs = 1000;
+const stopAnswerMs = 5000; // then a person must know that nothing answered
 let token = "";
 let stopPort = 0;
 let heard = 0;
@@ -137,8 +138,8 @@ export async function stop(): Promise<void> {
     return JSON.parse(text) as { standstill: boolean; not_confirmed: string };
   };
   const ways = [
-    fetch(`${location.protocol}//${location.hostname}:${stopPort}/local/stop`, { method: "POST", body, headers: { "content-type": "text/plain" } }),
-    request("/local/stop", { method: "POST", body }, token),
+    fetch(`${location.protocol}//${location.hostname}:${stopPort}/local/stop`, { method: "POST", body, headers: { "content-type": "text/plain" }, signal: AbortSignal.timeout(stopAnswerMs) }),
+    request("/local/stop", { method: "POST", body, signal: AbortSignal.timeout(stopAnswerMs) }, token),
   ].map(answered);
   try {
     const { standstill, not_confirmed } = await Promise.any(ways);

@@ -1,4 +1,5 @@
 // Always in sight where there is a rig: Stop, what the rig does, whose its lease is.
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { controls, desk, pageName, press, silent, stop } from "../data/rig";
 
 export const stateWords: Record<string, string> = {
@@ -17,14 +18,27 @@ function Pressed() {
   return <p class={`rig-pressed ${now.state === "failed" || now.state === "moves" ? "bad" : ""}`} role="alert">{text}</p>;
 }
 
+// What sticks below it needs to know how tall it is.
+function useHeight() {
+  const bar = useRef<HTMLElement>(null);
+  useLayoutEffect(() => {
+    const tell = () => document.documentElement.style.setProperty("--rig-bar", `${bar.current!.offsetHeight}px`);
+    const observer = new ResizeObserver(tell);
+    observer.observe(bar.current!);
+    return () => observer.disconnect();
+  }, []);
+  return bar;
+}
+
 export function RigBar() {
+  const bar = useHeight();
   const now = desk.value;
   const rig = now?.rig;
   const lost = silent.value || !rig?.answers;
   const state = !now ? "connecting" : silent.value ? "no news" : stateWords[rig?.state ?? ""] ?? rig?.state ?? "";
   const total = now?.checked?.possible ?? 0;
   return (
-    <header class="rig-bar" aria-label="Rig">
+    <header class="rig-bar" aria-label="Rig" ref={bar}>
       <div class="rig-line">
         <button type="button" class="stop" onClick={() => void stop()} title="Ends every motion now. A software stop, not safety-rated">Stop</button>
         <span class={`pill ${lost ? "wrong" : good.has(rig!.state!) ? "good" : "wrong"}`} role="status">{state}</span>
