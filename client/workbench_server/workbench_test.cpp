@@ -146,7 +146,7 @@ TEST_F(WorkbenchTest, TakesOnlyAGatewayForARig) {
   served.listen = "127.0.0.1:0";
   const auto server = *service::Server::Start(std::move(served));
   client::ConnectionOptions asked;
-  asked.servers = {server->address()};
+  asked.servers = {absl::StrCat("127.0.0.1:", server->port())};
   WorkbenchOptions options;
   options.connection = connection_.get();
   options.rig = *client::Connection::Open(std::move(asked));
@@ -162,7 +162,7 @@ TEST_F(WorkbenchTest, AsksTheNextServerWhereOneIsLost) {
     service::ServerOptions served;
     served.listen = "127.0.0.1:0";
     servers.push_back(*service::Server::Start(std::move(served)));
-    asked.servers.push_back(servers.back()->address());
+    asked.servers.push_back(absl::StrCat("127.0.0.1:", servers.back()->port()));
   }
   const std::vector<std::string> addresses = asked.servers;
   workbench_.reset();

@@ -45,7 +45,7 @@ export function RigBar() {
         {now && <span class="rig-who">
           {controls.value ? "You control the rig." : now.controller ? `${pageName(now.controller)} controls the rig; you look on.` : now.rig.lease_holder ? `${now.rig.lease_holder} holds the lease.` : "Nobody controls the rig."}
         </span>}
-        {now?.job && <span class="rig-job">{now.job}{now.job_moves && total > 0 && now.job === "touching" && <> {"\u00b7"} {now.done} of {total} <progress max={total} value={now.done} aria-label="Touches made" /></>}</span>}
+        {now?.job && <span class="rig-job">{now.ask ? "waiting for a person" : now.job}{now.job_moves && total > 0 && now.job === "touching" && <> {"\u00b7"} {now.done} of {total} <progress max={total} value={now.done} aria-label="Touches made" /></>}</span>}
         {rig?.emulated && <span class="soft">emulated rig</span>}
       </div>
       {silent.value && now && <p class="rig-pressed bad" role="alert">No news from touchstone workbench: what is shown may not be so any more. The emergency stop works without it.</p>}
