@@ -150,6 +150,7 @@ void RigDesk::Changed() {
   std::string text;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    if (rig_json_.empty()) return;  // nothing is known before the first look
     text = StateText();
   }
   watchers_->Publish(std::move(text));

@@ -38,7 +38,7 @@ class Watchers : public std::enable_shared_from_this<Watchers> {
   std::vector<std::shared_ptr<Watcher>> watchers_;
   std::string state_ = "{}";
   std::vector<std::string> items_;
-  uint64_t version_ = 1, list_ = 1;
+  uint64_t version_ = 0, list_ = 1;  // version 0: nothing was published yet
 };
 
 }  // namespace touchstone::workbench

@@ -53,6 +53,7 @@ interface News { state: Desk; list: number; first: number; items: Touched[] }
 function take(news: News): void {
   heard = performance.now();
   silent.value = false;
+  if (!news.state.rig) return; // nothing is known yet
   if (news.list !== list) items = [];
   list = news.list;
   if (news.first > items.length) return; // a part is missing; the whole list is asked for
