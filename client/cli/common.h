@@ -33,6 +33,7 @@ struct OutputOptions {
 struct SourceOptions {
   std::vector<std::string> servers;
   bool servers_from_environment = false;  // TOUCHSTONE_SERVER names them
+  std::string rig;                        // a gateway beside them; empty: none
   client::Credentials credentials;        // what those servers are shown
   std::vector<std::string> meshes;
   std::string mesh_folder;
@@ -82,8 +83,12 @@ class Cli {
   void AddSourceOptions(CLI::App* command);
   // --server, --wait-s and what a server is shown: for commands that need a rig.
   void AddRigOptions(CLI::App* command);
+  // --rig, beside the options of a source.
+  void AddRigBeside(CLI::App* command);
   // The source that those options name.
   absl::StatusOr<std::unique_ptr<client::Connection>> Connect() const;
+  // The gateway of --rig.
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToRigBeside() const;
   // The same at a server, without --wait-s: for what must not wait.
   absl::StatusOr<std::unique_ptr<client::Connection>> ConnectNow() const;
   // As Connect, with these meshes in place of --mesh and --mesh-dir where the source is in this process; a
@@ -135,6 +140,9 @@ class Cli {
   // What is wrong with an option that only a simulation in this process has.
   absl::Status EmbeddedOnly(absl::string_view option) const;
   void AddCredentialOptions(CLI::App* command);
+  absl::Status CheckWait() const;
+  absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServers(
+      std::vector<std::string> servers) const;
   int UsageError(const CLI::ParseError& error, int argc, char** argv);
   std::string HelpCommand() const;  // "touchstone model add" of what was typed so far
 

@@ -1,6 +1,7 @@
 // touchstone effects: the catalogue, and what one effect is.
 #include "client/cli/common.h"
 #include "client/cli/terminal.h"
+#include "client/workbench_server/formula_words.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/formula.h"
@@ -144,33 +145,10 @@ constexpr char kSurfaceMapHelp[] =
     "  touchstone model add nominal.yaml surface_map file=scan.csv -o scanned.yaml\n"
     "  touchstone mesh correct lat00.off --map better.surface.csv -o lat00_measured.off\n";
 
-Json FormulaJson() {
-  Json variables = Json::array();
-  for (const effects::FormulaVariable& variable : effects::FormulaVariables())
-    variables.push_back({{"name", variable.name},
-                         {"unit", variable.unit},
-                         {"since_stage", model::StageName(variable.since)},
-                         {"meaning", variable.meaning}});
-  Json pixel_variables = Json::array();
-  for (const effects::PixelVariable& variable : effects::PixelVariables())
-    pixel_variables.push_back(
-        {{"name", variable.name}, {"unit", variable.unit}, {"meaning", variable.meaning}});
-  Json functions = Json::array();
-  for (const effects::FormulaWord& word : effects::FormulaFunctions())
-    functions.push_back({{"name", word.name}, {"usage", word.usage}, {"meaning", word.meaning}});
-  Json constants = Json::array();
-  for (const effects::FormulaWord& word : effects::FormulaConstants())
-    constants.push_back({{"name", word.name}, {"meaning", word.meaning}});
-  return {{"variables", variables},
-          {"pixel_variables", pixel_variables},
-          {"functions", functions},
-          {"constants", constants}};
-}
-
 absl::Status Explain(const Cli& cli, const v1::Effect& effect) {
   if (cli.output().json) {
     Json json = EffectJson(effect);
-    if (effect.name() == "formula") json.update(FormulaJson());
+    if (effect.name() == "formula") json.update(workbench::FormulaWords());
     PrintJson(json);
     return absl::OkStatus();
   }

@@ -1,10 +1,8 @@
 // touchstone plan: the commanded touches of a plan, without touching anything.
-#include <algorithm>
-
 #include "client/cli/plan_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/source/lab_units.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/plan_expansion.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {
@@ -21,26 +19,6 @@ struct PlanCommandOptions {
   std::string output;
 };
 
-// Touches that one request asks for.
-constexpr uint32_t kTouchesPerRequest = 10000;
-
-// The touches of every object, in their order, with what the source said of them.
-struct PlannedTouches {
-  std::vector<client::MeasuredTouch> touches;
-  // By object; none of a list's.
-  std::vector<std::pair<std::string, v1::PlanDraws>> draws;
-  std::vector<std::string> notes;  // each once
-};
-
-void Add(const v1::PlanDraws& more, v1::PlanDraws* draws) {
-  draws->set_draws(draws->draws() + more.draws());
-  draws->set_no_surface(draws->no_surface() + more.no_surface());
-  draws->set_start_blocked(draws->start_blocked() + more.start_blocked());
-  draws->set_finger_missed(draws->finger_missed() + more.finger_missed());
-  draws->set_beyond_stroke(draws->beyond_stroke() + more.beyond_stroke());
-  draws->set_steep_incidence(draws->steep_incidence() + more.steep_incidence());
-}
-
 // Why draws were rejected, by the names that JSON has, and in words.
 struct Rejection {
   const char *name, *words;
@@ -55,43 +33,8 @@ std::vector<Rejection> RejectionsOf(const v1::PlanDraws& draws) {
           {"steep_incidence", "a finger met the surface too obliquely", draws.steep_incidence()}};
 }
 
-absl::StatusOr<PlannedTouches> Expand(const Cli& cli, client::Connection* connection,
-                                      const PlanCommandOptions& options, uint64_t count,
-                                      v1::ExpandPlanRequest request) {
-  PlannedTouches planned;
-  const std::vector<std::string> objects = SplitCommas(options.objects);
-  ProgressBar bar(!cli.output().quiet);
-  for (const std::string& object : objects) {
-    request.set_object(object);
-    v1::PlanDraws draws;
-    for (uint64_t done = 0; done < count;) {
-      const uint32_t step = static_cast<uint32_t>(std::min<uint64_t>(count - done, kTouchesPerRequest));
-      request.set_first_index(options.first + done);
-      request.set_count(step);
-      bar.Show(planned.touches.size(), count * objects.size(), planned.touches.size(), "touches");
-      TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ExpandPlanResponse response,
-                                  connection->Call(&v1::Source::Stub::ExpandPlan, request));
-      for (const v1::CommandedTouch& touch : response.touches()) {
-        client::MeasuredTouch row;
-        row.touch = options.first + planned.touches.size();
-        row.object = object;
-        row.commanded = touch;
-        planned.touches.push_back(std::move(row));
-      }
-      Add(response.draws(), &draws);
-      for (const std::string& note : response.notes())
-        if (std::find(planned.notes.begin(), planned.notes.end(), note) == planned.notes.end())
-          planned.notes.push_back(note);
-      if (response.touches_size() == 0) break;  // the plan has ended
-      done += step;
-    }
-    if (draws.draws() > 0) planned.draws.emplace_back(object, draws);
-  }
-  return planned;
-}
-
 // How many draws the touches took, and what is odd about them.
-void LogDraws(const Cli& cli, const PlannedTouches& planned) {
+void LogDraws(const Cli& cli, const client::PlannedTouches& planned) {
   for (const std::string& note : planned.notes) cli.Log("note: " + note);
   for (const auto& [object, draws] : planned.draws) {
     uint64_t rejected = 0;
@@ -106,7 +49,7 @@ void LogDraws(const Cli& cli, const PlannedTouches& planned) {
   }
 }
 
-Json DrawsJson(const PlannedTouches& planned) {
+Json DrawsJson(const client::PlannedTouches& planned) {
   Json json = Json::object();
   for (const auto& [object, draws] : planned.draws) {
     Json& item = json[object] = {{"draws", draws.draws()}};
@@ -146,8 +89,13 @@ absl::Status RunPlan(const Cli& cli, const PlanCommandOptions& options, bool cou
     count = uint64_t{6} * request.plan().faces().samples_per_face() * request.plan().faces().rounds();
   if (!count_given && request.plan().has_list()) count = request.plan().list().touches_size();
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, cli.Connect());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const PlannedTouches planned,
-                              Expand(cli, connection.get(), options, count, std::move(request)));
+  ProgressBar bar(!cli.output().quiet);
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const client::PlannedTouches planned,
+      client::ExpandPlan(connection.get(), SplitCommas(options.objects), options.first, count,
+                         std::move(request),
+                         [&bar](uint64_t done, uint64_t total) { bar.Show(done, total, done, "touches"); }));
+  bar.Clear();
   LogDraws(cli, planned);
   const std::string details = absl::StrCat(" (", Counted(planned.touches.size(), "touch", "touches"), ")");
   if (!cli.output().json) {

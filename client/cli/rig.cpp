@@ -1,19 +1,11 @@
 // touchstone rig: the group, and what its commands share.
 #include "client/cli/rig.h"
 
-#include <algorithm>
-
 #include <google/protobuf/util/json_util.h>
 
 #include "server/base/status.h"
 
 namespace touchstone::cli {
-namespace {
-
-constexpr size_t kChecksARequest = 100;
-
-}  // namespace
-
 absl::StatusOr<RigConnection> ConnectToRig(const Cli& cli) {
   if (cli.source().servers.empty())
     return absl::InvalidArgumentError(
@@ -53,41 +45,10 @@ absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const
                              const std::string& object, const std::string& up_face) {
   if (state.object() == object && client::UpFaceWord(state.up_face()) == up_face) return absl::OkStatus();
   if (!state.mounts_itself())
-    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(RestingFaceRequest(object, up_face, state.object())));
+    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(client::RestingFaceRequest(object, up_face, state.object())));
   else
     cli.Log(absl::StrCat("the rig puts ", object, " on the fixture with its face ", up_face, " up"));
   return source->Mount(object, client::UpFaceOf(up_face)).status();
-}
-
-absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>& wanted,
-                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks) {
-  for (size_t first = 0; first < wanted.size();) {
-    v1::CheckTouchesRequest request;
-    request.set_object((*rows)[wanted[first]].touch.object);
-    request.set_path(checks != nullptr);
-    size_t stop = first;
-    while (stop < wanted.size() && stop - first < kChecksARequest &&
-           (*rows)[wanted[stop]].touch.object == request.object())
-      *request.add_touches() = (*rows)[wanted[stop++]].touch.commanded;
-    TOUCHSTONE_ASSIGN_OR_RETURN(v1::CheckTouchesResponse response,
-                                connection->CallOnce(&v1::Rig::Stub::CheckTouches, request));
-    if (static_cast<size_t>(response.checks_size()) != stop - first)
-      return absl::InternalError(
-          absl::StrCat("the source checked ", response.checks_size(), " of ", stop - first, " touches"));
-    for (size_t k = first; k < stop; ++k) {
-      v1::TouchCheck& check = *response.mutable_checks(static_cast<int>(k - first));
-      PlannedRow& row = (*rows)[wanted[k]];
-      row.possible = check.possible();
-      row.reason = check.reason();
-      row.notes.assign(check.notes().begin(), check.notes().end());
-      row.up_face = client::UpFaceWord(check.up_face());
-      row.duration_s = check.duration_s();
-      if (checks != nullptr) checks->push_back(std::move(check));
-    }
-    first = stop;
-    if (Interrupt::Raised()) return absl::CancelledError("interrupted");
-  }
-  return absl::OkStatus();
 }
 
 std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines) {

@@ -7,10 +7,14 @@
 
 #include "client/cli/common.h"
 #include "client/cli/motion_options.h"
-#include "client/cli/rig_plan.h"
+#include "client/source/rig_plan.h"
 #include "client/source/rig_words.h"
 
 namespace touchstone::cli {
+
+using client::CheckRows;
+using client::PlannedRow;
+using client::RigGroup;
 
 // A connection to --server, which must be given and must be a physical source: its description goes along.
 struct RigConnection {
@@ -27,11 +31,6 @@ absl::StatusOr<Json> RigJson(const v1::State& state, const v1::RigState& rig);
 // person is asked, unless it lies there already.
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
                              const std::string& object, const std::string& up_face);
-
-// Checks the rows that `wanted` names (indices), in parts, and fills in what the source says. `path` of each
-// row's check goes to `paths` (may be null).
-absl::Status CheckRows(client::Connection* connection, const std::vector<size_t>& wanted,
-                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks);
 
 // "2 of 192 touches are impossible: ...", with a line for each of the first few.
 std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines);

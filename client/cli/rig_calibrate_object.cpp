@@ -96,7 +96,7 @@ absl::StatusOr<std::vector<PlannedRow>> PlanTouches(const Cli& cli, const Calibr
     all.push_back(rows.size());
     rows.push_back(std::move(row));
   }
-  TOUCHSTONE_RETURN_IF_ERROR(CheckRows(connection, all, &rows, nullptr));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRows(connection, all, &rows, nullptr, [] { return !Interrupt::Raised(); }));
   const std::string impossible = ImpossibleTable(rows, kMaxTargetsShown);
   if (!impossible.empty()) cli.Log(impossible + "these are left out");
   return rows;

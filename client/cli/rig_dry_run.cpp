@@ -108,14 +108,15 @@ std::string NotesText(const std::vector<PlannedRow>& rows) {
 absl::Status RunDryRun(const Cli& cli, const DryRunOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> plan, ReadTouches(options.plan));
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<PlannedRow> rows,
-                              RowsOf(plan, client::SessionNameOf(options.plan), options.plan));
+                              client::RowsOf(plan, client::SessionNameOf(options.plan), options.plan));
   TOUCHSTONE_ASSIGN_OR_RETURN(const RigConnection rig, ConnectToRig(cli));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig.connection.get()));
   std::vector<size_t> all(rows.size());
   std::iota(all.begin(), all.end(), size_t{0});
   std::vector<v1::TouchCheck> checks;
-  TOUCHSTONE_RETURN_IF_ERROR(
-      CheckRows(rig.connection.get(), all, &rows, options.drawing.empty() ? nullptr : &checks));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig.connection.get(), all, &rows,
+                                       options.drawing.empty() ? nullptr : &checks,
+                                       [] { return !Interrupt::Raised(); }));
 
   if (!options.drawing.empty()) {
     TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.drawing, Drawing(options, state, rows, checks)));
@@ -123,7 +124,7 @@ absl::Status RunDryRun(const Cli& cli, const DryRunOptions& options) {
   }
   const size_t possible =
       std::count_if(rows.begin(), rows.end(), [](const PlannedRow& row) { return row.possible; });
-  const std::vector<RigGroup> groups = GroupRows(
+  const std::vector<RigGroup> groups = client::GroupRows(
       rows, [&](size_t row) { return rows[row].possible; }, state.object(),
       client::UpFaceWord(state.up_face()));
   double duration_s = 0;

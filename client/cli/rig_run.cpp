@@ -37,7 +37,7 @@ class Run {
     if (options_.output != journal_path_) files.push_back({"-o", options_.output});
     TOUCHSTONE_RETURN_IF_ERROR(cli_.CheckOutputs(files));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> plan, ReadTouches(options_.plan));
-    TOUCHSTONE_ASSIGN_OR_RETURN(rows_, RowsOf(plan, session_, options_.plan));
+    TOUCHSTONE_ASSIGN_OR_RETURN(rows_, client::RowsOf(plan, session_, options_.plan));
     TOUCHSTONE_ASSIGN_OR_RETURN(rig_, ConnectToRig(cli_));
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state, GetRig(rig_.connection.get()));
     TOUCHSTONE_ASSIGN_OR_RETURN(record_, RigRecord::Open(journal_path_, session_, state));
@@ -63,7 +63,8 @@ class Run {
  private:
   // A dry run of what is to be made.
   absl::Status Check(const std::vector<size_t>& wanted) {
-    TOUCHSTONE_RETURN_IF_ERROR(CheckRows(rig_.connection.get(), wanted, &rows_, nullptr));
+    TOUCHSTONE_RETURN_IF_ERROR(
+        CheckRows(rig_.connection.get(), wanted, &rows_, nullptr, [] { return !Interrupt::Raised(); }));
     for (const PlannedRow& row : rows_) impossible_ += !row.possible;
     if (impossible_ == 0) return absl::OkStatus();
     cli_.Log(ImpossibleTable(rows_, kMaxRefusalsShown));
@@ -86,7 +87,7 @@ class Run {
     const StopOnInterrupt stop_on_interrupt(source_.get());
     std::vector<bool> take(rows_.size());
     for (const size_t row : wanted) take[row] = rows_[row].possible;
-    const std::vector<RigGroup> groups = GroupRows(
+    const std::vector<RigGroup> groups = client::GroupRows(
         rows_, [&](size_t row) { return take[row]; }, state.object(), client::UpFaceWord(state.up_face()));
     for (const RigGroup& group : groups) {
       left_s_ += group.duration_s;
@@ -159,7 +160,7 @@ class Run {
     size_t misses = 0;
     for (const client::MeasuredTouch& touch : touches)
       misses += std::any_of(touch.time_s.begin(), touch.time_s.end(), [](double t) { return std::isnan(t); });
-    const double noise_s = NoiseOfRepeats(touches);
+    const double noise_s = client::NoiseOfRepeats(touches);
     const bool csv = options_.output != journal_path_;
     if (csv) {
       if (touches.empty())

@@ -105,8 +105,8 @@ bool Obey(const std::string& line, const TeachOptions& options, const v1::GuideS
     return true;
   }
   const absl::StatusOr<client::MeasuredTouch> touch =
-      TaughtTouch(now, taught->size(), options.standoff_mm * kMetresPerMillimetre,
-                  options.speed_mm_s * kMetresPerMillimetre);
+      client::TaughtTouch(now, taught->size(), options.standoff_mm * kMetresPerMillimetre,
+                          options.speed_mm_s * kMetresPerMillimetre);
   if (!touch.ok()) {
     std::fprintf(stderr, "not kept: %s\n", std::string(touch.status().message()).c_str());
     return true;

@@ -80,6 +80,14 @@ void Cli::AddRigOptions(CLI::App* command) {
   AddServerOptions(command, "The touchstone-gateway that works the rig. Default: TOUCHSTONE_SERVER");
 }
 
+void Cli::AddRigBeside(CLI::App* command) {
+  command
+      ->add_option("--rig", source_.rig,
+                   "A touchstone-gateway, whose rig the page then works: plan, dry run, touches, stop")
+      ->type_name("HOST:PORT")
+      ->group(kGroup);
+}
+
 void Cli::AddSourceOptions(CLI::App* command) {
   AddServerOptions(command,
                    "A touchstone-server, or several with commas (the next one takes over from a lost one); "
@@ -126,6 +134,30 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectNow() const {
   return client::Connection::Open(std::move(options));
 }
 
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectToRigBeside() const {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckWait());
+  return ConnectToServers({source_.rig});
+}
+
+absl::Status Cli::CheckWait() const {
+  if (source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
+}
+
+absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectToServers(
+    std::vector<std::string> servers) const {
+  client::ConnectionOptions options;
+  options.servers = std::move(servers);
+  options.credentials = client::WithEnvironment(source_.credentials);
+  options.wait_s = source_.wait_s;
+  options.log = [this](const std::string& line) { Log(line); };
+  TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, client::Connection::Open(std::move(options)));
+  const std::string proxy = service::ProxyFor(connection->address());
+  Detail(absl::StrCat("connected to ", connection->address(), proxy.empty() ? "" : " through ", proxy));
+  return connection;
+}
+
 absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
     std::vector<source::MeshSpec> meshes) const {
   client::ConnectionOptions options;
@@ -136,28 +168,20 @@ absl::StatusOr<std::unique_ptr<client::Connection>> Cli::ConnectWithMeshes(
                                 : source_.egl_device >= 0 ? "--egl-device"
                                                           : nullptr;
     if (embedded_only != nullptr) return EmbeddedOnly(embedded_only);
-    if (!(source_.wait_s >= 0 && source_.wait_s <= kMaxWaitS))
-      return absl::InvalidArgumentError(
-          absl::StrCat("--wait-s: ", ShortestNumber(source_.wait_s), " is out of range; 0 to ", kMaxWaitS));
-    options.credentials = client::WithEnvironment(source_.credentials);
-    options.wait_s = source_.wait_s;
-    options.log = [this](const std::string& line) { Log(line); };
-    absl::StatusOr<std::unique_ptr<client::Connection>> opened = client::Connection::Open(std::move(options));
+    TOUCHSTONE_RETURN_IF_ERROR(CheckWait());
+    auto opened = ConnectToServers(std::move(options.servers));
     if (!opened.ok() && source_.servers_from_environment)
       return absl::Status(opened.status().code(),
                           absl::StrCat(opened.status().message(), " (", kServerVariable,
                                        " names it; --server ", kNoServer, ": in this process)"));
-    TOUCHSTONE_ASSIGN_OR_RETURN(auto connection, std::move(opened));
-    const std::string proxy = service::ProxyFor(connection->address());
-    Detail(absl::StrCat("connected to ", connection->address(), proxy.empty() ? "" : " through ", proxy));
-    return connection;
+    return opened;
   }
   const client::Credentials& shown = source_.credentials;
   const char* const server_only = !shown.tls_ca.empty()                               ? "--tls-ca"
                                   : !shown.tls_cert.empty() || !shown.tls_key.empty() ? "--tls-cert"
                                   : !shown.token_file.empty()                         ? "--token-file"
                                                                                       : nullptr;
-  if (server_only != nullptr)
+  if (server_only != nullptr && source_.rig.empty())
     return absl::InvalidArgumentError(absl::StrCat(server_only, ": works only with --server HOST:PORT"));
   service::ServerOptions& embedded = options.embedded;
   embedded.meshes = std::move(meshes);

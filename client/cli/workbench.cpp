@@ -59,16 +59,22 @@ absl::Status RunWorkbench(const Cli& cli, const WorkbenchFlags& options) {
     served.evidence = comparison->evidence();
     TOUCHSTONE_RETURN_IF_ERROR(NameModel(&comparison->connection(), &*served.evidence));
   }
-  client::Connection& connection = comparison ? comparison->connection() : *alone;
   served.port = options.port;
-  served.channel = connection.channel();
-  served.address = connection.address();
+  served.connection = comparison ? &comparison->connection() : alone.get();
+  served.log = [&cli](const std::string& line) { cli.Log(line); };
+  if (!cli.source().rig.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(served.rig, cli.ConnectToRigBeside());
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto page, workbench::Workbench::Start(std::move(served)));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Print(absl::StrCat(page->Url(), "\n")));
   std::fflush(stdout);  // a reader of a pipe waits for it
   std::cout.flush();
   cli.Log("the page is at this address, for this machine alone; Ctrl-C ends it");
-  if (options.open) OpenInBrowser(cli, page->Url());
+  RedirectFile redirect;
+  if (options.open) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(redirect, RedirectFile::To(page->Url()));
+    OpenInBrowser(cli, redirect.path(), page->Url());
+  }
   WaitForInterrupt();
   return absl::OkStatus();
 }
@@ -85,9 +91,11 @@ void AddWorkbench(Cli* cli) {
                       "missing, watch the error fall.",
                       "touchstone workbench --open                                  offers an example\n"
                       "touchstone workbench set.csv --model nominal.yaml --mesh-dir meshes --open\n"
-                      "touchstone workbench set.csv --model nominal.yaml --server 127.0.0.1:50051",
+                      "touchstone workbench set.csv --model nominal.yaml --server 127.0.0.1:50051\n"
+                      "touchstone workbench --rig 127.0.0.1:50052 --open              works a rig, too",
                       [cli, options] { return RunWorkbench(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
+  cli->AddRigBeside(command);
   command->add_option("--port", options->port, "Port at 127.0.0.1. Default: 0, any that is free")
       ->type_name("N");
   command->add_flag("--open", options->open, "Open the page in the browser");

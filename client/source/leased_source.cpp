@@ -175,8 +175,16 @@ void LeasedSource::Interrupt(const std::string& reason) {
     if (stopped.ok() && description_.lease_required() && options_.log)
       options_.log("the rig is stopped, until 'touchstone rig reset' releases it");
   }
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (running_ != nullptr) running_->TryCancel();
+  EndCalls();
+}
+
+void LeasedSource::EndCalls() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    interrupted_ = true;
+    if (running_ != nullptr) running_->TryCancel();
+  }
+  interruption_.notify_all();
 }
 
 }  // namespace touchstone::client

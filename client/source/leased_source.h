@@ -48,6 +48,8 @@ class LeasedSource {
   // Ends what is under way: at a physical source Control.Stop first. Safe from any thread; what
   // runs returns CANCELLED.
   void Interrupt(const std::string& reason);
+  // The same for a caller that has stopped the source itself.
+  void EndCalls();
 
  private:
   LeasedSource(Connection* connection, LeasedSourceOptions options)

@@ -17,12 +17,18 @@ absl::StatusOr<absl::string_view> PageTemplate() {
                                                     "then --json writes the same report"));
 }
 
-absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach) {
+absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach, int stop_port) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const absl::string_view page, PageTemplate());
   const size_t mark = page.find(kDataMark);
   std::string head(page.substr(0, mark));
   if (reach == PageReach::kOwnOrigin)
-    absl::StrReplaceAll({{"default-src 'none';", "default-src 'none'; connect-src 'self';"}}, &head);
+    absl::StrReplaceAll(
+        {{"default-src 'none';", absl::StrCat("default-src 'none'; connect-src 'self'",
+                                              stop_port == 0 ? ""
+                                                             : absl::StrCat(" http://127.0.0.1:", stop_port,
+                                                                            " http://localhost:", stop_port),
+                                              ";")}},
+        &head);
   // "</script>" in a name must not end the element.
   return absl::StrCat(head, absl::StrReplaceAll(EscapeInJson(json), {{"<", "\\u003c"}, {">", "\\u003e"}}),
                       page.substr(mark + kDataMark.size()));

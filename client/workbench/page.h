@@ -18,6 +18,7 @@ inline constexpr absl::string_view kDataMark = "@TOUCHSTONE_DATA@";
 enum class PageReach { kNobody, kOwnOrigin };
 
 // The page with these data (JSON) inside. Nothing in them ends the element that holds them.
-absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach);
+// `stop_port`: with kOwnOrigin, a second port of this machine that it may ask; 0: none.
+absl::StatusOr<std::string> FilledPage(absl::string_view json, PageReach reach, int stop_port = 0);
 
 }  // namespace touchstone::workbench

@@ -4,16 +4,19 @@
 
 #include <memory>
 
-#include <grpcpp/channel.h>
-
 #include "client/workbench_server/http_server.h"
+#include "client/workbench_server/upstream.h"
 
 namespace touchstone::workbench {
 
 // Whether the request is gRPC-Web's: a POST of its content type.
 bool IsGrpcWeb(const HttpRequest& request);
 
-// Answers the exchange; the call is cancelled where the browser goes. Returns at once.
-void ForwardCall(std::shared_ptr<grpc::Channel> channel, std::shared_ptr<Exchange> exchange);
+// The server that answered, as a header of the answer.
+inline constexpr char kServerHeader[] = "x-touchstone-server";
+
+// Answers the exchange; the call is cancelled where the browser goes. A call whose server is lost before it has said anything
+// is made again at the next server; one that is lost later ends with UNAVAILABLE. Returns at once.
+void ForwardCall(std::shared_ptr<Upstream> upstream, std::shared_ptr<Exchange> exchange);
 
 }  // namespace touchstone::workbench

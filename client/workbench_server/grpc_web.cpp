@@ -10,12 +10,16 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <vector>
+#include <optional>
+
+#include "server/base/printable.h"
+#include "server/service/access_roles.h"
 
 namespace touchstone::workbench {
 namespace {
 
-constexpr size_t kHeadBytes = 5;  // flags, and the length in network order
+constexpr size_t kHeadBytes = 5;   // flags, and the length in network order
+constexpr size_t kMaxShown = 100;  // of a path, in a message
 constexpr uint8_t kCompressed = 0x01, kTrailers = 0x80;
 
 std::string Frame(uint8_t flags, absl::string_view content) {
@@ -26,14 +30,6 @@ std::string Frame(uint8_t flags, absl::string_view content) {
   for (int shift = 24; shift >= 0; shift -= 8) frame += static_cast<char>(size >> shift & 0xff);
   frame.append(content.data(), content.size());
   return frame;
-}
-
-const std::vector<std::string>& BridgedMethods() {
-  static const std::vector<std::string> methods = {
-      "Diagnosis/Compare", "Diagnosis/Diagnose",  "Diagnosis/Propose",    "Models/ListEffects",
-      "Models/ListModels", "Models/GetModel",     "Source/Describe",      "Source/ListObjects",
-      "Source/ExpandPlan", "Sessions/GetSession", "Sessions/ListSessions"};
-  return methods;
 }
 
 }  // namespace
@@ -119,13 +115,14 @@ std::optional<std::chrono::nanoseconds> ParseTimeout(absl::string_view text) {
 }
 
 absl::Status CheckMethod(absl::string_view path) {
-  absl::string_view method = path;
-  const bool ours = absl::ConsumePrefix(&method, "/touchstone.v1.");
-  const std::vector<std::string>& bridged = BridgedMethods();
-  if (ours && std::find(bridged.begin(), bridged.end(), method) != bridged.end()) return absl::OkStatus();
-  return absl::PermissionDeniedError(absl::StrCat(
-      path, " is not open to the page, which reads, compares and diagnoses (", absl::StrJoin(bridged, ", "),
-      "); what moves a rig or changes what a server keeps is asked for by the command line"));
+  const std::optional<service::Role> role = service::RoleNeeded(path, service::Motion::kRig);
+  if (!role.has_value())
+    return absl::UnimplementedError(absl::StrCat(Printable(path, kMaxShown), " is no method of Touchstone"));
+  if (*role <= service::Role::kReader) return absl::OkStatus();
+  return absl::PermissionDeniedError(absl::StrCat(path, " needs the role ", service::RoleName(*role),
+                                                  ", and the page calls as a reader: what moves a rig goes "
+                                                  "through its view Touch (--rig), and what changes what a "
+                                                  "server keeps through the command line"));
 }
 
 }  // namespace touchstone::workbench

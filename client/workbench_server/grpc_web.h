@@ -39,8 +39,9 @@ std::string PercentEncoded(absl::string_view text);
 // "100m": 100 milliseconds. Nothing where it is no time-out of gRPC's.
 std::optional<std::chrono::nanoseconds> ParseTimeout(absl::string_view text);
 
-// Whether the bridge forwards "/package.Service/Method". What is inside of this process asks for no credentials, so the list
-// stands here: what reads and what diagnoses. PERMISSION_DENIED says what the method would do and what to use instead.
+// Whether the bridge forwards "/package.Service/Method". What is inside of this process asks for no credentials, so the bridge
+// asks by itself: what a reader may do at a rig (server/service/access_roles.cpp) is forwarded, and nothing else.
+// PERMISSION_DENIED says which role it takes; UNIMPLEMENTED: no service has it.
 absl::Status CheckMethod(absl::string_view path);
 
 }  // namespace touchstone::workbench

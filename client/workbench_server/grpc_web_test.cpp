@@ -35,13 +35,16 @@ TEST(GrpcWeb, ReadsTimeouts) {
     EXPECT_FALSE(ParseTimeout(wrong)) << wrong;
 }
 
-TEST(GrpcWeb, BridgesWhatReadsAndDiagnosesAlone) {
-  EXPECT_TRUE(CheckMethod("/touchstone.v1.Diagnosis/Compare").ok());
+TEST(GrpcWeb, BridgesWhatAReaderMayDoAtARig) {
+  for (const char* let :
+       {"/touchstone.v1.Diagnosis/Compare", "/touchstone.v1.Control/Stop", "/touchstone.v1.Rig/GetRig"})
+    EXPECT_TRUE(CheckMethod(let).ok()) << let;
   for (const char* refused :
-       {"/touchstone.v1.Control/Stop", "/touchstone.v1.Rig/Home", "/touchstone.v1.Source/Touch",
-        "/touchstone.v1.Models/CreateModel", "/touchstone.v1.Sessions/DeleteSession",
-        "/other.v1.Diagnosis/Compare", "/Diagnosis/Compare", "/"})
+       {"/touchstone.v1.Rig/Home", "/touchstone.v1.Source/Touch", "/touchstone.v1.Control/AcquireLease",
+        "/touchstone.v1.Models/CreateModel", "/touchstone.v1.Sessions/DeleteSession"})
     EXPECT_EQ(CheckMethod(refused).code(), absl::StatusCode::kPermissionDenied) << refused;
+  for (const char* unknown : {"/other.v1.Diagnosis/Compare", "/Diagnosis/Compare", "/"})
+    EXPECT_EQ(CheckMethod(unknown).code(), absl::StatusCode::kUnimplemented) << unknown;
 }
 
 TEST(GrpcWeb, KnowsItsContentTypes) {

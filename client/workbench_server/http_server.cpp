@@ -142,6 +142,7 @@ class Connection : public Exchange, public std::enable_shared_from_this<Connecti
         std::make_shared<http::response<http::string_body>>(http::response_header<>(std::move(fields)));
     response->result(status);
     SetCommon(&response->base());
+    if (!asked_by_.empty()) response->set(http::field::access_control_allow_origin, asked_by_);
     response->keep_alive(false);
     response->body() = std::move(body);
     response->prepare_payload();
@@ -202,8 +203,10 @@ class Connection : public Exchange, public std::enable_shared_from_this<Connecti
   // Before the body is read: who asks, and for how much.
   void CheckHead() {
     const auto& head = parser_.get();
-    absl::Status allowed = CheckOrigin(head);
-    if (allowed.ok() && head.target() != options_->open_path) allowed = CheckToken(head, options_->token);
+    const bool page = head.target() == options_->open_path;
+    absl::Status allowed = options_->beside_page ? CheckOriginBesidePage(head) : CheckOrigin(head, page);
+    if (allowed.ok() && !page && !options_->beside_page) allowed = CheckToken(head, options_->token);
+    if (options_->beside_page) asked_by_ = std::string(head[http::field::origin]);
     if (!allowed.ok()) return Refuse(allowed);
     stream_.expires_after(Milliseconds(options_->limits.stall_s));
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](beast::error_code error, size_t) {
@@ -287,6 +290,7 @@ class Connection : public Exchange, public std::enable_shared_from_this<Connecti
   std::function<void()> gone_;
   bool left_ = false;
   std::string watched_, drained_;
+  std::string asked_by_;  // the origin of a page of another port, which reads the answer
 };
 
 void Registry::StopAll() {

@@ -46,6 +46,9 @@ struct HttpOptions {
   HttpLimits limits;
   std::string token;  // that everything but `open_path` asks for
   std::string open_path = "/";
+  // For a port beside the page's own, so that nothing that the page waits for stands in its way: pages of any port of this machine
+  // may ask, without the head's token; the handler asks for it in the body.
+  bool beside_page = false;
 };
 
 class HttpServer {

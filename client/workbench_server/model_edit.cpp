@@ -8,8 +8,11 @@
 
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
+#include "server/model/own_name.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -22,7 +25,7 @@ absl::StatusOr<model::Model> Parse(const std::string& yaml, const char* origin) 
 
 auto Find(model::Model* model, const std::string& name) {
   return std::find_if(model->effects.begin(), model->effects.end(),
-                      [&](const model::EffectInstance& one) { return one.effect->name == name; });
+                      [&](const model::EffectInstance& one) { return model::OwnName(*one.effect) == name; });
 }
 
 // The effect of `from` in place of the one in `model`, or at its end.
@@ -38,10 +41,30 @@ absl::Status Take(const std::string& name, model::Model from, model::Model* mode
   return absl::OkStatus();
 }
 
+// New values of a formula, which keeps its expression: "k=0.3" in the unit of its parameter.
+absl::Status SetFormula(const std::vector<std::string>& assignments, model::EffectInstance* formula) {
+  for (const std::string& assignment : assignments) {
+    const size_t equals = assignment.find('=');
+    const std::string name = assignment.substr(0, equals);
+    const auto& parameters = formula->effect->parameters;
+    const auto found = std::find_if(parameters.begin(), parameters.end(),
+                                    [&](const model::ParameterInfo& one) { return one.name == name; });
+    if (equals == std::string::npos || found == parameters.end())
+      return absl::InvalidArgumentError(absl::StrCat(
+          "'", assignment, "': the formula '", model::OwnName(*formula->effect), "' has no such parameter"));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double value, ParseNumber(assignment.substr(equals + 1)));
+    formula->values[found - parameters.begin()] = ToSi(found->unit, value);
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<model::Model> Changed(const json& request) {
   TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model, Parse(request.at("yaml"), "the model"));
   const std::string change = request.at("change");
   if (change == "none") return model;
+  if (change == "formula")
+    return model::AddEffect(model, "formula", request.at("assignments").get<std::vector<std::string>>(),
+                            effects::Catalogue());
   const std::string effect = request.at("effect");
   if (change == "remove") return model::RemoveEffect(model, effect);
   if (change == "take") {
@@ -51,7 +74,12 @@ absl::StatusOr<model::Model> Changed(const json& request) {
   }
   if (change != "set")
     return absl::InvalidArgumentError(
-        absl::StrCat("change = '", change, "'; none, take, set or remove was expected"));
+        absl::StrCat("change = '", change, "'; none, take, set, formula or remove was expected"));
+  if (const auto there = Find(&model, effect); there != model.effects.end() && there->effect->formula) {
+    TOUCHSTONE_RETURN_IF_ERROR(
+        SetFormula(request.at("assignments").get<std::vector<std::string>>(), &*there));
+    return model;
+  }
   TOUCHSTONE_ASSIGN_OR_RETURN(
       model::Model alone,
       model::AddEffect(model::NominalModel(model.fingers, model.spacing_m), effect,
@@ -78,9 +106,9 @@ json EffectsJson(const model::Model& model) {
                             {"meaning", parameter.meaning},
                             {"values", values}});
     }
-    // Formulas and lookups are more than their values.
-    const bool editable = effects::Catalogue().Find(one.effect->name) != nullptr;
-    effects.push_back({{"name", one.effect->name},
+    const bool editable = one.effect->formula || (!one.effect->lookup && !one.effect->surface_map);
+    effects.push_back({{"name", model::OwnName(*one.effect)},
+                       {"formula", one.effect->formula ? one.effect->formula->expression : ""},
                        {"per_object", one.per_object},
                        {"editable", editable},
                        {"parameters", parameters}});

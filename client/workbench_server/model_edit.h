@@ -11,7 +11,9 @@ namespace touchstone::workbench {
 //   "none"             nothing
 //   "take"             the effect as the model "from" has it, for instance a report's improved model
 //   "set"              the effect with "assignments", ["radius_mm=2.5"], in place of the one that is there
-//   "remove"           the effect
+//                      of a formula the values alone, ["k=0.3"]
+//   "formula"          a formula of "assignments", as `touchstone model add MODEL formula` takes them, at the end
+//   "remove"           the effect; a formula and a lookup by their own names
 // The answer: {"yaml", "hash", "name", "effects": [{"name", "parameters": [{"name", "unit", "values": [..]}]}]}, values in the
 // units of files. INVALID_ARGUMENT says what is wrong with the request or the model.
 absl::StatusOr<std::string> ChangeModel(const std::string& request);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/workbench_server/formula_words.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
@@ -57,6 +58,41 @@ TEST(ChangeModel, RefusesWhatIsNoChange) {
                                 {"assignments", {"radius_mm=1e9"}}}
                                .dump())
                    .ok());
+}
+
+TEST(ChangeModel, AddsAFormulaSetsItsValuesAndTakesItAway) {
+  const std::string nominal = model::FormatModel(model::NominalModel());
+  const json added =
+      Changed({{"yaml", nominal},
+               {"change", "formula"},
+               {"assignments",
+                {"name=screw", "adds=travel_mm", "expression=k * sin(travel_mm/lead)", "k=0", "k_unit=mm",
+                 "k_min=-1", "k_max=1", "lead=4", "lead_unit=mm", "lead_min=2", "lead_max=10"}}});
+  ASSERT_EQ(added["effects"].size(), 1u);
+  EXPECT_EQ(added["effects"][0]["name"], "screw");
+  EXPECT_TRUE(added["effects"][0]["editable"]);
+  const json set = Changed({{"yaml", added["yaml"]},
+                            {"change", "set"},
+                            {"effect", "screw"},
+                            {"assignments", {"k=0.25", "lead=5"}}});
+  EXPECT_EQ(set["effects"][0]["parameters"][0]["values"][0], 0.25);
+  EXPECT_EQ(set["effects"][0]["formula"], "k * sin(travel_mm/lead)");
+  const json removed = Changed({{"yaml", set["yaml"]}, {"change", "remove"}, {"effect", "screw"}});
+  EXPECT_EQ(removed["effects"].size(), 0u);
+  const auto wrong = ChangeModel(json{
+      {"yaml", set["yaml"]},
+      {"change", "set"},
+      {"effect", "screw"},
+      {"assignments", {"pitch=1"}}}.dump());
+  EXPECT_EQ(wrong.status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(NamesInFormula, SaysWhatIsUsedAndWhereAnErrorIs) {
+  const auto named = NamesInFormula(json{{"expression", "k * sin(travel_mm)"}}.dump());
+  ASSERT_TRUE(named.ok()) << named.status();
+  EXPECT_EQ(json::parse(*named)["names"][1], (json{{"name", "travel_mm"}, {"character", 9}}));
+  const auto wrong = NamesInFormula(json{{"expression", "k * * 2"}}.dump());
+  EXPECT_EQ(std::string(wrong.status().message()).rfind("character 5", 0), 0u) << wrong.status();
 }
 
 }  // namespace

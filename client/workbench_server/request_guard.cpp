@@ -7,6 +7,7 @@
 
 #include "server/base/check.h"
 #include "server/base/printable.h"
+#include "server/base/status.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -22,12 +23,25 @@ std::string Shown(const std::string& text) {
   return Printable(text, kMaxShown);
 }
 
-// A name of this machine that no DNS server can point elsewhere; any port, since it may be forwarded (ssh -L).
-bool IsLoopbackHost(const std::string& host) {
+// "[::1]" of "[::1]:8000", "localhost" of "localhost".
+std::string WithoutPort(const std::string& host) {
   const size_t colon = host.rfind(':');
   const bool has_port = colon != std::string::npos && host.find(']', colon) == std::string::npos;
-  const std::string name = has_port ? host.substr(0, colon) : host;
-  return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
+  return has_port ? host.substr(0, colon) : host;
+}
+
+// A name of this machine that no DNS server can point elsewhere; any port, since it may be forwarded (ssh -L).
+absl::Status CheckHost(const std::string& host) {
+  const std::string name = WithoutPort(host);
+  if (name == "127.0.0.1" || name == "localhost" || name == "[::1]") return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      absl::StrCat("the host '", Shown(host),
+                   "' is not this machine; 127.0.0.1 or localhost was expected, as in the "
+                   "address that touchstone workbench printed"));
+}
+
+absl::Status OtherPage(const std::string& who, const std::string& host) {
+  return absl::PermissionDeniedError(absl::StrCat(who, "; only the page at http://", host, " may"));
 }
 
 }  // namespace
@@ -38,27 +52,40 @@ std::string NewToken() {
   return absl::BytesToHexString({reinterpret_cast<const char*>(bytes), sizeof bytes});
 }
 
-absl::Status CheckOrigin(const boost::beast::http::fields& head) {
+absl::Status CheckOrigin(const boost::beast::http::fields& head, bool page) {
   using boost::beast::http::field;
   const std::string host = Text(head[field::host]);
-  if (!IsLoopbackHost(host))
-    return absl::PermissionDeniedError(
-        absl::StrCat("the host '", Shown(host),
-                     "' is not this machine; 127.0.0.1 or localhost was expected, as in the "
-                     "address that touchstone workbench printed"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckHost(host));
   const auto origin = head.find(field::origin);
   if (origin != head.end() && Text(origin->value()) != "http://" + host)
-    return absl::PermissionDeniedError(absl::StrCat("a page of '", Shown(Text(origin->value())),
-                                                    "' asks; only the page at http://", host, " may"));
+    return OtherPage(absl::StrCat("a page of '", Shown(Text(origin->value())), "' asks"), host);
   const std::string site = Text(head["Sec-Fetch-Site"]);
-  if (!site.empty() && site != "same-origin" && site != "none")
-    return absl::PermissionDeniedError(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site),
-                                                    "); only the page at http://", host, " may"));
+  const bool opened =
+      page && Text(head["Sec-Fetch-Mode"]) == "navigate" && Text(head["Sec-Fetch-Dest"]) == "document";
+  if (!site.empty() && site != "same-origin" && site != "none" && !opened)
+    return OtherPage(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site), ")"), host);
+  return absl::OkStatus();
+}
+
+absl::Status CheckOriginBesidePage(const boost::beast::http::fields& head) {
+  using boost::beast::http::field;
+  const std::string host = Text(head[field::host]), origin = Text(head[field::origin]);
+  TOUCHSTONE_RETURN_IF_ERROR(CheckHost(host));
+  const std::string name = "http://" + WithoutPort(host);
+  if (!origin.empty() && origin.rfind(name + ":", 0) != 0)
+    return OtherPage(absl::StrCat("a page of '", Shown(origin), "' asks"), WithoutPort(host));
+  const std::string site = Text(head["Sec-Fetch-Site"]);
+  if (!site.empty() && site != "same-origin" && site != "same-site")
+    return OtherPage(absl::StrCat("another page asks (Sec-Fetch-Site: ", Shown(site), ")"),
+                     WithoutPort(host));
   return absl::OkStatus();
 }
 
 absl::Status CheckToken(const boost::beast::http::fields& head, const std::string& token) {
-  const std::string shown = Text(head[kTokenHeader]);
+  return CheckToken(Text(head[kTokenHeader]), token);
+}
+
+absl::Status CheckToken(const std::string& shown, const std::string& token) {
   if (shown.size() == token.size() && CRYPTO_memcmp(shown.data(), token.data(), token.size()) == 0)
     return absl::OkStatus();
   return absl::UnauthenticatedError(

@@ -14,10 +14,15 @@ inline constexpr char kTokenHeader[] = "x-touchstone-token";
 // 128 random bits, hex.
 std::string NewToken();
 
-// PERMISSION_DENIED says what is wrong with Host, Origin or Sec-Fetch-Site.
-absl::Status CheckOrigin(const boost::beast::http::fields& head);
+// PERMISSION_DENIED says what is wrong with Host, Origin or Sec-Fetch-Site. `page`: the page itself is asked for, which holds
+// nothing that is secret; a browser may be led there from elsewhere, as by the file that --open opens.
+absl::Status CheckOrigin(const boost::beast::http::fields& head, bool page);
+
+// The same for the port beside the page's: another port of the same host may ask.
+absl::Status CheckOriginBesidePage(const boost::beast::http::fields& head);
 
 // UNAUTHENTICATED where the token is missing or another one.
 absl::Status CheckToken(const boost::beast::http::fields& head, const std::string& token);
+absl::Status CheckToken(const std::string& shown, const std::string& token);
 
 }  // namespace touchstone::workbench

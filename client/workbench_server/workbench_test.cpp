@@ -16,6 +16,7 @@
 #include "client/workbench_server/grpc_web.h"
 #include "server/base/test_paths.h"
 #include "server/base/text.h"
+#include "server/service/server.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -33,7 +34,7 @@ class WorkbenchTest : public ::testing::Test {
 
   void Serve(HttpLimits limits) {
     WorkbenchOptions options;
-    options.channel = connection_->channel();
+    options.connection = connection_.get();
     options.limits = limits;
     workbench_ = *Workbench::Start(std::move(options));
     host_ = "127.0.0.1:" + std::to_string(workbench_->port());
@@ -104,7 +105,7 @@ TEST_F(WorkbenchTest, PassesOnAnErrorAndRefusesWhatIsNoCall) {
 TEST_F(WorkbenchTest, RefusesMethodsThatMoveOrKeep) {
   for (const char* method : {"Control/AcquireLease", "Rig/Home", "Source/Touch"}) {
     const std::string answer = Call(method, MessageFrame(""));
-    EXPECT_TRUE(Has(answer, "grpc-status: 7\r\n") && Has(answer, "the command line")) << answer;
+    EXPECT_TRUE(Has(answer, "grpc-status: 7\r\n") && Has(answer, "needs the role operator")) << answer;
   }
 }
 
@@ -121,6 +122,60 @@ TEST_F(WorkbenchTest, RefusesOtherHostsOriginsAndTokens) {
   EXPECT_TRUE(
       Has(Ask(Head("GET /local/state", host_, "Origin: http://" + host_ + "\r\n", 0)), "HTTP/1.1 200"));
   EXPECT_TRUE(Has(Ask(Head("GET /etc/passwd", host_, "", 0)), "HTTP/1.1 404"));
+}
+
+// A file of this user leads the browser there; nothing else of another site does.
+TEST_F(WorkbenchTest, IsOpenedFromElsewhereAsAPageAlone) {
+  const std::string elsewhere = "Sec-Fetch-Site: cross-site\r\n";
+  const std::string opened = elsewhere + "Sec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: document\r\n";
+  EXPECT_TRUE(Has(Ask(Head("GET /", host_, opened, 0)), "HTTP/1.1 200"));
+  EXPECT_TRUE(Has(Ask(Head("GET /", host_, elsewhere, 0)), "HTTP/1.1 403"));
+  EXPECT_TRUE(Has(Ask(Head("GET /local/state", host_, opened, 0)), "HTTP/1.1 403"));
+}
+
+TEST_F(WorkbenchTest, WithoutARigSaysHowToGetOne) {
+  for (const char* path : {"POST /local/rig", "POST /local/stop", "GET /local/watch"}) {
+    const std::string answer = Ask(Head(path, host_, "", 0));
+    EXPECT_TRUE(Has(answer, "HTTP/1.1 400") && Has(answer, "--rig")) << answer;
+  }
+  EXPECT_EQ(workbench_->stop_port(), 0);
+}
+
+TEST_F(WorkbenchTest, TakesOnlyAGatewayForARig) {
+  service::ServerOptions served;
+  served.listen = "127.0.0.1:0";
+  const auto server = *service::Server::Start(std::move(served));
+  client::ConnectionOptions asked;
+  asked.servers = {absl::StrCat("127.0.0.1:", server->port())};
+  WorkbenchOptions options;
+  options.connection = connection_.get();
+  options.rig = *client::Connection::Open(std::move(asked));
+  const auto refused = Workbench::Start(std::move(options));
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_TRUE(Has(std::string(refused.status().message()), "a touchstone-gateway was expected"));
+}
+
+TEST_F(WorkbenchTest, AsksTheNextServerWhereOneIsLost) {
+  std::vector<std::unique_ptr<service::Server>> servers;
+  client::ConnectionOptions asked;
+  for (int k = 0; k < 2; ++k) {
+    service::ServerOptions served;
+    served.listen = "127.0.0.1:0";
+    servers.push_back(*service::Server::Start(std::move(served)));
+    asked.servers.push_back(absl::StrCat("127.0.0.1:", servers.back()->port()));
+  }
+  const std::vector<std::string> addresses = asked.servers;
+  workbench_.reset();
+  connection_ = *client::Connection::Open(std::move(asked));
+  Serve({});
+  const std::string header = "x-touchstone-server: ";
+  EXPECT_TRUE(Has(Call("Models/ListEffects", MessageFrame("")), header + addresses[0]));
+  servers[0].reset();
+  const std::string answer = Call("Models/ListEffects", MessageFrame(""));
+  EXPECT_TRUE(Has(answer, header + addresses[1]) && Has(answer, "grpc-status: 0\r\n"))
+      << answer.substr(0, 300);
+  servers[1].reset();
+  EXPECT_TRUE(Has(Call("Models/ListEffects", MessageFrame("")), "grpc-status: 14\r\n"));
 }
 
 TEST_F(WorkbenchTest, RefusesWhatIsTooLarge) {

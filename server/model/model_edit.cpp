@@ -12,6 +12,7 @@
 #include "server/model/formula_fields.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"
+#include "server/model/own_name.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
 
@@ -212,9 +213,7 @@ absl::StatusOr<Model> RemoveEffect(const Model& model, const std::string& name) 
   std::vector<std::string> known;
   for (size_t index = 0; index < model.effects.size(); ++index) {
     const Effect& effect = *model.effects[index].effect;
-    const std::string own = effect.formula  ? effect.formula->name
-                            : effect.lookup ? effect.lookup->name
-                                            : effect.name;
+    const std::string& own = OwnName(effect);
     known.push_back(own);
     if (own != name) continue;
     Model result = model;

@@ -7,12 +7,14 @@ import { Explore } from "./views/explore";
 import { Commands, Head } from "./views/head";
 import { Ladder } from "./views/ladder";
 import { Live } from "./views/live";
-import { stale } from "./data/live";
+import { place, rungs, stale } from "./data/live";
 import { Photographs } from "./views/photographs";
 import { Power } from "./views/power";
 import { Data, Distributions, Methods, Next, Provenance } from "./views/rest";
+import { RigBar } from "./views/rig_bar";
 import { Sessions } from "./views/sessions";
 import { Problems, Todo } from "./views/todo";
+import { Touch } from "./views/touch";
 import { Detail, Where } from "./views/where";
 import { Unexplained, Why } from "./views/why";
 
@@ -67,7 +69,8 @@ export function App() {
 export function LiveApp() {
   return (
     <>
-      <div class="live-main" role={page.value ? "region" : "main"} aria-label="Workbench"><Live /></div>
+      {place.value?.rig && <RigBar />}
+      <div class={`live-main${place.value?.rig && !rungs.value.length ? " unopened" : ""}`} role={page.value ? "region" : "main"} aria-label="Workbench"><Live />{place.value?.rig && <Touch />}</div>
       {page.value && <div class={stale.value ? "stale" : undefined}><App /></div>}
     </>
   );

@@ -1,10 +1,11 @@
 // The live workbench: the same page data as a file's, made anew from the evidence and the model as it is edited.
-import { computed, signal } from "@preact/signals";
+import { computed, effect, signal } from "@preact/signals";
 import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import { startRig } from "./rig";
 import { download } from "../charts/export";
-import { page, session } from "../state";
+import { followHash, page, session } from "../state";
 
 export interface Parameter { name: string; unit: string; lower: number; upper: number; typical: number; neutral: number; meaning: string; values: number[] }
 export interface ModelEffect { name: string; per_object: boolean; editable: boolean; parameters: Parameter[] }
@@ -12,7 +13,7 @@ export interface Model { yaml: string; hash: string; name: string; effects: Mode
 export interface Rung { name: string; model: Model; rmse: number }
 
 export const live = signal(false);
-export const place = signal<{ evidence: boolean; origin: string; source: string } | null>(null);
+export const place = signal<{ evidence: boolean; origin: string; source: string; rig: string; stop_port: number } | null>(null);
 export const origin = signal("");
 export const rungs = signal<Rung[]>([]); // the given model, then one per change
 export const diagnosis = signal<Report | null>(null);
@@ -62,6 +63,14 @@ async function doing(what: string, act: (signal: AbortSignal) => Promise<void>, 
 
 // Compare or Diagnose with this model; the report's bytes.
 async function ask(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
+  // A server that was lost in the middle: the workbench finds the next one, and the whole is asked again.
+  try { return await askOnce(method, yaml, signal); } catch (reason) {
+    if (!(reason instanceof CallError) || reason.code !== unavailable || signal.aborted) throw reason;
+    return askOnce(method, yaml, signal);
+  }
+}
+
+async function askOnce(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
   let report: Uint8Array | null = null;
   // A field that comes again wins: the model of the evidence is replaced, the rest stays as it came.
   const asked = field(1, joined(evidence, field(3, field(3, yaml))));
@@ -72,7 +81,7 @@ async function ask(method: string, yaml: string, signal: AbortSignal): Promise<U
       for (const part of fieldsOf(bytes)) if (part.number === 1) progress.stage = text(part.bytes); else if (part.number === 2) progress.done = double(part.bytes);
       if (working.value) working.value = { ...working.value, ...progress };
     }
-  });
+  }, (server) => { if (place.value && place.value.source !== server) place.value = { ...place.value, source: server }; });
   if (!report) throw new Error("the answer has no report");
   return report;
 }
@@ -122,16 +131,47 @@ async function change(of: Record<string, unknown>): Promise<Model> {
 
 const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
 
-async function open(path: string, what: string): Promise<void> {
+// What a reload of the page needs: where the measurements came from, and the model with its steps.
+interface Kept { token: string; path: string; saved: string; rungs: { name: string; yaml: string; rmse: number | null }[] }
+let opened = "";
+function keepWork(): void {
+  if (!opened || !rungs.value.length) return;
+  const kept: Kept = { token, path: opened, saved, rungs: rungs.value.map(({ name, model: { yaml }, rmse }) => ({ name, yaml, rmse: Number.isFinite(rmse) ? rmse : null })) };
+  try { sessionStorage.setItem("work", JSON.stringify(kept)); } catch { /* too large: a reload begins anew */ }
+}
+function keptWork(): Kept | null {
+  const kept = JSON.parse(sessionStorage.getItem("work") ?? "null") as Kept | null;
+  return kept?.token === token ? kept : null;
+}
+async function reopen({ path, saved: before, rungs: steps }: Kept): Promise<void> {
+  await doing("Opening again", async (signal) => {
+    await readEvidence(path, signal);
+    const models = await Promise.all(steps.map(({ yaml }) => change({ yaml, change: "none" })));
+    signal.throwIfAborted();
+    saved = before;
+    rungs.value = steps.map(({ name, rmse }, i) => ({ name, model: models[i], rmse: rmse ?? Number.NaN }));
+    await compareLast(signal);
+  });
+}
+
+// The model's text that comes along.
+async function readEvidence(path: string, signal: AbortSignal): Promise<string> {
+  evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
+  opened = path;
+  let yaml = "";
+  for (const { number, bytes } of fieldsOf(evidence)) {
+    if (number === 7) origin.value = text(bytes);
+    if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
+  }
+  return yaml;
+}
+
+async function open(path: string, what: string, keep = false): Promise<void> {
   await doing(what, async (signal) => {
-    evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
-    let yaml = "";
-    for (const { number, bytes } of fieldsOf(evidence)) {
-      if (number === 7) origin.value = text(bytes);
-      if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
-    }
-    const given = await change({ yaml, change: "none" });
-    saved = given.yaml;
+    const yaml = await readEvidence(path, signal);
+    // The model of the page stays where there is one: other measurements, the same question.
+    const given = keep && model.value ? model.value : await change({ yaml, change: "none" });
+    if (!keep) saved = given.yaml;
     rungs.value = [{ name: given.name, model: given, rmse: Number.NaN }];
     diagnosis.value = null;
     await compareLast(signal);
@@ -139,6 +179,7 @@ async function open(path: string, what: string): Promise<void> {
 }
 
 export const openExample = () => open("evidence?example", "Making the example");
+export const openRigSet = () => open("evidence?rig", "Comparing", /*keep=*/true);
 
 export const diagnose = () => doing("Looking for what is missing", async (signal) => {
   diagnosis.value = await show(await ask("Diagnose", model.value!.yaml, signal), signal);
@@ -172,6 +213,27 @@ export function undo(): void {
   rungs.value = rungs.value.slice(0, -1);
   stale.value = true;
   void doing("Back to the model before", compareLast);
+}
+
+export interface FormulaWords {
+  variables: { name: string; unit: string; meaning: string }[]; pixel_variables: { name: string }[];
+  functions: { usage: string; meaning: string }[]; constants: { name: string; meaning: string }[]; units: string[];
+}
+export interface FormulaParameter { name: string; value: string; unit: string; min: string; max: string }
+export const formulaWords = async () => (await local("formula")).json() as Promise<FormulaWords>;
+export const namesIn = async (expression: string) =>
+  ((await (await local("formula", { method: "POST", body: JSON.stringify({ expression }) })).json()) as { names: { name: string }[] }).names.map((one) => one.name);
+
+// What is wrong with it, or nothing: then it is in the model.
+export async function addFormula(name: string, adds: string, expression: string, parameters: FormulaParameter[]): Promise<string> {
+  const assignments = [`name=${name}`, `adds=${adds}`, `expression=${expression}`,
+    ...parameters.flatMap((one) => [`${one.name}=${one.value}`, ...(one.unit ? [`${one.name}_unit=${one.unit}`] : []), `${one.name}_min=${one.min}`, `${one.name}_max=${one.max}`])];
+  let next: Model;
+  try { next = await change({ yaml: model.value!.yaml, change: "formula", assignments }); } catch (reason) { return (reason as Error).message; }
+  rungs.value = [...rungs.value, { name: `+ ${name}`, model: next, rmse: Number.NaN }];
+  stale.value = true;
+  void doing(`+ ${name}`, compareLast);
+  return "";
 }
 
 // A slider's value. Values that come while one is compared wait, and the last of them is the next: the error follows a slider
@@ -211,5 +273,10 @@ export async function startLive(): Promise<void> {
   token = given ?? sessionStorage.getItem("token") ?? "";
   await doing("Connecting", async (signal) => { place.value = await (await local("state", { signal })).json(); });
   addEventListener("beforeunload", (event) => { if (model.value && model.value.yaml !== saved) event.preventDefault(); });
-  if (place.value?.evidence) await open("evidence", "Comparing");
+  if (place.value?.rig) startRig(token, place.value.stop_port);
+  followHash();
+  effect(() => { void rungs.value; keepWork(); });
+  const kept = keptWork();
+  if (kept) await reopen(kept);
+  else if (place.value?.evidence) await open("evidence", "Comparing");
 }

@@ -89,11 +89,12 @@ export async function request(path: string, init: RequestInit, token: string): P
 }
 
 // A call with one message; every message of the answer goes to `take`.
-export async function call(method: string, message: Uint8Array, token: string, signal: AbortSignal, take: (message: Uint8Array) => void): Promise<void> {
+export async function call(method: string, message: Uint8Array, token: string, signal: AbortSignal, take: (message: Uint8Array) => void, answeredBy: (server: string) => void = () => undefined): Promise<void> {
   const head = new Uint8Array(5);
   new DataView(head.buffer).setUint32(1, message.length);
   const response = await request(`/touchstone.v1.${method}`, { method: "POST", body: joined(head, message), signal, headers: { "content-type": "application/grpc-web+proto", "x-grpc-web": "1" } }, token);
   if (!response.ok) throw new CallError(7, (await response.text()).trim());
+  if (response.headers.has("x-touchstone-server")) answeredBy(response.headers.get("x-touchstone-server")!);
   if (response.headers.has("grpc-status")) return throwUnlessOk(response.headers.get("grpc-status"), response.headers.get("grpc-message"));
   try {
     for await (const { flags, content } of frames(response.body!)) {

@@ -3,11 +3,12 @@ import { useRef } from "preact/hooks";
 import { Bar } from "../parts/parts";
 import { effectProbability, error, number, share, typeset, withError } from "../format";
 import { page } from "../state";
+import { Formula } from "./formula";
 import { type Lost, type ModelEffect, cancel, diagnose, diagnosis, failure, model, moved, openExample, origin, place, rungs, save, setValue, stale, take, undo, working } from "../data/live";
 
 const help: Record<NonNullable<Lost>, string> = {
   workbench: "If the program has ended, save the model first: this page cannot reach a new one. Then start touchstone workbench again, with --model and the saved file, and open the address that it prints.",
-  server: "The page and the model stay. Try again when the server answers.",
+  server: "The page and the model stay. With several servers (--server A,B) the next one goes on by itself; here none answers. Try again when one does.",
 };
 
 function Failure() {
@@ -172,6 +173,7 @@ export function Live() {
       <LiveLadder />
       <Found />
       <Values />
+      <Formula />
     </section>
   );
 }

@@ -48,7 +48,7 @@ function ControlChart({ report, effect, value }: { report: Report; effect: Compa
       <div class="plot-head"><div class="plot-title">{name}{value.unit && <span class="faint">, {unitSymbol(value.unit)}</span>}</div>
         <Tools title={name} rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...value.sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]} /></div>
       <svg viewBox={`0 0 ${width} ${height}`} role="img" aria-label={said}>
-        {value.sessions.map((one, i) => limited(one) && <rect x={x(i) - step / 2} width={step} y={y(one.limit_upper)} height={Math.max(1, y(one.limit_lower) - y(one.limit_upper))} fill="var(--track)" />)}
+        {value.sessions.map((one, i) => limited(one) && <rect x={x(i) - step / 2} width={step} y={y(one.limit_upper)} height={Math.max(1, y(one.limit_lower) - y(one.limit_upper))} fill="var(--pale)" />)}
         <polyline points={value.sessions.map((one, i) => `${x(i)},${y(one.value)}`).join(" ")} fill="none" stroke="var(--axis)" />
         {value.sessions.map((one, i) => (
           <g>
@@ -77,7 +77,7 @@ export function Sessions() {
   const few = data.length <= 3;
   return (
     <Section id="sessions" title="Between the sessions" lead={typeset(compared.words)}>
-      <Table title="Sessions" columns={["Session", { title: "touches", number: true }, { title: "given model", number: true }, { title: "its own", number: true }, { title: "noise floor", number: true }]}
+      <Table title="Sessions" columns={["Session", { title: "Touches", number: true }, { title: "Given model", number: true }, { title: "Its own model", number: true }, { title: "Noise floor", number: true }]}
         rows={data.map((one, place) => [<button type="button" class="link" aria-pressed={entry.value?.index === place} onClick={() => { session.value = place; }}>{sessionLabel(data, place)}</button>, count(one.count),
           one.initial.rmse > 0 ? error(one.kind, one.initial.rmse) : "\u2013", one.final.rmse > 0 ? error(one.kind, one.final.rmse) : "\u2013", one.noise_floor > 0 ? error(one.kind, one.noise_floor) : "\u2013"])}
         csv={() => [["session", "touches", "rmse", "final_rmse", "noise_floor"], ...data.map((one) => [one.session, one.count, one.initial.rmse, one.final.rmse, one.noise_floor])]}
@@ -90,7 +90,7 @@ export function Sessions() {
         csv={() => [["effect", "value", "object", "session", "estimate", "std_error", "change", "p"], ...rows.flatMap(({ effect, value }) => value.sessions.map((one) => [effect.effect, valueName(effect, value), effect.object, data[one.session].session, one.value, one.std_error, value.change, effect.p]))]} />}
       {charted.length > 0 && <>
         <h3>History</h3>
-        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--track)", text: "what the other sessions let expect, three standard deviations" }]} /></p>
+        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--pale)", text: "what the other sessions let expect, three standard deviations" }]} /></p>
         <div class="charts">{charted.map(({ effect, value }) => <ControlChart report={report} effect={effect} value={value} />)}</div>
       </>}
     </Section>

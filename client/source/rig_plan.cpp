@@ -1,4 +1,4 @@
-#include "client/cli/rig_plan.h"
+#include "client/source/rig_plan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,20 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/source/rig_words.h"
 #include "client/source/touch_ids.h"
+#include "server/base/status.h"
 #include "server/geometry/pose.h"
 #include "server/service/convert.h"
 #include "server/session/base_pose.h"
 #include "server/session/command_bytes.h"
 
-namespace touchstone::cli {
+namespace touchstone::client {
+namespace {
+
+constexpr size_t kChecksPerRequest = 100;
+
+}  // namespace
 
 std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::function<bool(size_t)>& take,
                                 const std::string& mounted_object, const std::string& mounted_up_face) {
@@ -47,21 +54,53 @@ std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::
   return groups;
 }
 
-absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::MeasuredTouch>& plan,
+absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<MeasuredTouch>& plan,
                                                const std::string& session, const std::string& origin) {
   std::vector<PlannedRow> rows;
   std::set<std::string> ids;
-  for (const client::MeasuredTouch& touch : plan) {
+  for (const MeasuredTouch& touch : plan) {
     PlannedRow row;
     row.touch = touch;
     row.touch.time_s.clear();
-    row.id = client::TouchId(session, touch.object, touch.touch);
+    row.id = TouchId(session, touch.object, touch.touch);
     if (!ids.insert(row.id).second)
       return absl::InvalidArgumentError(absl::StrCat(origin, ": touch ", touch.touch, " of ", touch.object,
                                                      " stands twice; every touch needs a number of its own"));
     rows.push_back(std::move(row));
   }
   return rows;
+}
+
+absl::Status CheckRows(Connection* connection, const std::vector<size_t>& wanted,
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks,
+                       const std::function<bool()>& go_on) {
+  for (size_t first = 0; first < wanted.size();) {
+    v1::CheckTouchesRequest request;
+    request.set_object((*rows)[wanted[first]].touch.object);
+    request.set_path(checks != nullptr);
+    size_t stop = first;
+    while (stop < wanted.size() && stop - first < kChecksPerRequest &&
+           (*rows)[wanted[stop]].touch.object == request.object())
+      *request.add_touches() = (*rows)[wanted[stop++]].touch.commanded;
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::CheckTouchesResponse response,
+                                connection->CallOnce(&v1::Rig::Stub::CheckTouches, request));
+    if (static_cast<size_t>(response.checks_size()) != stop - first)
+      return absl::InternalError(
+          absl::StrCat("the source checked ", response.checks_size(), " of ", stop - first, " touches"));
+    for (size_t k = first; k < stop; ++k) {
+      v1::TouchCheck& check = *response.mutable_checks(static_cast<int>(k - first));
+      PlannedRow& row = (*rows)[wanted[k]];
+      row.possible = check.possible();
+      row.reason = check.reason();
+      row.notes.assign(check.notes().begin(), check.notes().end());
+      row.up_face = UpFaceWord(check.up_face());
+      row.duration_s = check.duration_s();
+      if (checks != nullptr) checks->push_back(std::move(check));
+    }
+    first = stop;
+    if (go_on && !go_on()) return absl::CancelledError("interrupted");
+  }
+  return absl::OkStatus();
 }
 
 std::string RestingFaceRequest(const std::string& object, const std::string& up_face,
@@ -71,15 +110,15 @@ std::string RestingFaceRequest(const std::string& object, const std::string& up_
   return absl::StrCat("Put ", object, " on the fixture with its face ", up_face, " up");
 }
 
-absl::StatusOr<client::MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
-                                                  double standoff_m, double speed_m_s) {
+absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number, double standoff_m,
+                                          double speed_m_s) {
   if (state.object().empty() || !state.has_object_from_tip())
     return absl::FailedPreconditionError(
         "what lies on the fixture is unknown, or the calibration has no pose of it: touchstone rig mount "
         "says it");
   const Eigen::Isometry3d object_from_tip =
       geometry::PoseFromVector(session::ParseBasePose(state.object_from_tip()));
-  client::MeasuredTouch touch;
+  MeasuredTouch touch;
   touch.touch = number;
   touch.object = state.object();
   *touch.commanded.mutable_target_m() = service::ToProto(Eigen::Vector3d(object_from_tip.translation()));
@@ -90,14 +129,14 @@ absl::StatusOr<client::MeasuredTouch> TaughtTouch(const v1::GuideState& state, u
   return touch;
 }
 
-double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {
+double NoiseOfRepeats(const std::vector<MeasuredTouch>& touches) {
   struct Repeats {
     std::vector<double> sum, sum_of_squares;
     size_t count = 0;
   };
   std::map<std::pair<std::string, std::string>, Repeats> poses;
   size_t fingers = 0;
-  for (const client::MeasuredTouch& touch : touches) {
+  for (const MeasuredTouch& touch : touches) {
     double mean = 0;
     for (const double time_s : touch.time_s) mean += time_s / touch.time_s.size();
     fingers = std::max(fingers, touch.time_s.size());
@@ -129,4 +168,4 @@ double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches) {
                                 : std::numeric_limits<double>::quiet_NaN();
 }
 
-}  // namespace touchstone::cli
+}  // namespace touchstone::client

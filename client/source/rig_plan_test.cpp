@@ -1,25 +1,21 @@
-// The order of a rig's touches, their noise, and the local record that makes a run resumable.
-#include "client/cli/rig_plan.h"
+// The order of a rig's touches, and their noise.
+#include "client/source/rig_plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
-#include "client/cli/journal_session.h"
-#include "client/cli/rig_record.h"
 #include "server/base/random.h"
-#include "server/base/test_folder.h"
 
-namespace touchstone::cli {
+namespace touchstone::client {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-client::MeasuredTouch Touch(uint64_t number, const std::string& object, double x_m = 0) {
-  client::MeasuredTouch touch;
+MeasuredTouch Touch(uint64_t number, const std::string& object, double x_m = 0) {
+  MeasuredTouch touch;
   touch.touch = number;
   touch.object = object;
   touch.commanded.mutable_target_m()->set_x(x_m);
@@ -94,10 +90,10 @@ TEST(RigPlan, TellsAPersonWhatToDo) {
 TEST(NoiseOfRepeats, IsThatOfOneFinger) {
   constexpr double kSigmaS = 50e-6;
   RandomStream random(7, RandomDomain::kTest);
-  std::vector<client::MeasuredTouch> touches;
+  std::vector<MeasuredTouch> touches;
   for (int repeat = 0; repeat < 400; ++repeat)
     for (int pose = 0; pose < 3; ++pose) {
-      client::MeasuredTouch touch = Touch(touches.size(), "a", 0.01 * pose);
+      MeasuredTouch touch = Touch(touches.size(), "a", 0.01 * pose);
       touch.commanded.set_session_time_s(touches.size());
       // The whole touch comes earlier or later, which is no noise of a finger.
       const double start_s = 1 + 0.01 * random.Normal();
@@ -110,73 +106,13 @@ TEST(NoiseOfRepeats, IsThatOfOneFinger) {
 }
 
 TEST(NoiseOfRepeats, IsUnknownWithoutRepeatsAndIgnoresMisses) {
-  client::MeasuredTouch a = Touch(0, "a"), b = Touch(1, "a", 0.01);
+  MeasuredTouch a = Touch(0, "a"), b = Touch(1, "a", 0.01);
   a.time_s = {1, 2, 3};
   b.time_s = {1, 2, 4};
   EXPECT_TRUE(std::isnan(NoiseOfRepeats({a, b})));
   b = a;
   b.time_s[1] = NAN;
   EXPECT_TRUE(std::isnan(NoiseOfRepeats({a, b})));
-}
-
-class RigRecordTest : public ::testing::Test {
- protected:
-  std::unique_ptr<RigRecord> Open() {
-    auto record = RigRecord::Open(folder_.Path("session.db"), "monday", v1::RigState());
-    EXPECT_TRUE(record.ok()) << record.status();
-    return *std::move(record);
-  }
-  static v1::TouchResult Result() {
-    v1::TouchResult result;
-    for (const double time_s : {1.0, 1.25, static_cast<double>(NAN)}) result.add_contact_time_s(time_s);
-    result.mutable_measured()->set_session_time_s(12.5);
-    return result;
-  }
-
-  TestFolder folder_;
-};
-
-TEST_F(RigRecordTest, WhatIsDoneIsNotAskedForAgain) {
-  const client::MeasuredTouch done = Touch(0, "a"), begun = Touch(1, "a", 0.01), failed = Touch(2, "a", 0.02);
-  {
-    const auto record = Open();
-    EXPECT_FALSE(*record->Has("0", done));
-    ASSERT_TRUE(record->Begin("0", done, "+z").ok());
-    ASSERT_TRUE(record->Done("0", Result()).ok());
-    ASSERT_TRUE(record->Begin("1", begun, "+z").ok());
-    ASSERT_TRUE(record->Begin("2", failed, "+z").ok());
-    ASSERT_TRUE(record->Failed("2", absl::AbortedError("stopped")).ok());
-  }
-  // As after a kill: one is done, one under way, one failed.
-  const auto record = Open();
-  EXPECT_TRUE(*record->Has("0", done));
-  EXPECT_FALSE(*record->Has("1", begun));
-  EXPECT_FALSE(*record->Has("2", failed));
-  for (const auto& [id, touch] : {std::pair("1", begun), std::pair("2", failed)}) {
-    ASSERT_TRUE(record->Begin(id, touch, "+z").ok());
-    ASSERT_TRUE(record->Done(id, Result()).ok());
-  }
-  const auto touches = record->Touches();
-  ASSERT_TRUE(touches.ok()) << touches.status();
-  ASSERT_EQ(touches->size(), 3u);
-  EXPECT_DOUBLE_EQ((*touches)[0].time_s[1], 1.25);
-  EXPECT_TRUE(std::isnan((*touches)[0].time_s[2]));
-  EXPECT_DOUBLE_EQ((*touches)[0].commanded.session_time_s(), 12.5);
-}
-
-TEST_F(RigRecordTest, AChangedPlanIsRefused) {
-  const auto record = Open();
-  ASSERT_TRUE(record->Begin("0", Touch(0, "a"), "+z").ok());
-  ASSERT_TRUE(record->Done("0", Result()).ok());
-  const auto other = record->Has("0", Touch(0, "a", 0.01));
-  EXPECT_EQ(other.status().code(), absl::StatusCode::kAlreadyExists);
-  EXPECT_THAT(std::string(other.status().message()), HasSubstr("the plan was changed"));
-}
-
-TEST(RigRecord, JournalsStandBesideMeasurementFiles) {
-  EXPECT_EQ(*JournalPathOf("out/session.db"), "out/session.db");
-  EXPECT_EQ(*JournalPathOf("out/set.csv"), "out/set.db");
-  EXPECT_EQ(JournalPathOf("out/set.txt").status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 // The tip's frame has z along the approach and x along the fingers.
@@ -199,4 +135,4 @@ TEST(TaughtTouch, TouchesWhereTheTipIsAlongItsAxis) {
 }
 
 }  // namespace
-}  // namespace touchstone::cli
+}  // namespace touchstone::client

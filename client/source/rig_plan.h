@@ -1,4 +1,4 @@
-// The order in which a rig makes the touches of a plan, and its messages. Pure functions.
+// The order in which a rig makes the touches of a plan, and its messages. Pure functions, but for CheckRows.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,15 @@
 
 #include <absl/status/statusor.h>
 
+#include "client/source/connection.h"
 #include "client/source/measurement_csv.h"
 #include "touchstone/v1/freedrive.pb.h"
 
-namespace touchstone::cli {
+namespace touchstone::client {
 
 // A row of the plan with what its check said.
 struct PlannedRow {
-  client::MeasuredTouch touch;
+  MeasuredTouch touch;
   std::string id;
   bool possible = true;
   std::string reason;   // why not
@@ -37,8 +38,14 @@ std::vector<RigGroup> GroupRows(const std::vector<PlannedRow>& rows, const std::
                                 const std::string& mounted_object, const std::string& mounted_up_face);
 
 // The rows of a plan with their ids; INVALID_ARGUMENT if two have one number for the same object.
-absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<client::MeasuredTouch>& plan,
+absl::StatusOr<std::vector<PlannedRow>> RowsOf(const std::vector<MeasuredTouch>& plan,
                                                const std::string& session, const std::string& origin);
+
+// Checks the rows that `wanted` names (indices), in parts, and fills in what the source says; each row's check, with its path,
+// goes to `checks` (may be null). `go_on` is asked between two parts (may be null): CANCELLED where it says no.
+absl::Status CheckRows(Connection* connection, const std::vector<size_t>& wanted,
+                       std::vector<PlannedRow>* rows, std::vector<v1::TouchCheck>* checks,
+                       const std::function<bool()>& go_on = nullptr);
 
 // "Put lat20 on the fixture with its face -x up", or where it lies there already, "Turn lat20 so that its
 // face -x points up".
@@ -47,11 +54,11 @@ std::string RestingFaceRequest(const std::string& object, const std::string& up_
 
 // The touch whose contact a guided arm shows: its tip is the target, its axis the approach. FAILED_PRECONDITION without an
 // object on the fixture.
-absl::StatusOr<client::MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number,
-                                                  double standoff_m, double speed_m_s);
+absl::StatusOr<MeasuredTouch> TaughtTouch(const v1::GuideState& state, uint64_t number, double standoff_m,
+                                          double speed_m_s);
 
 // The standard deviation of one finger's contact time among repeats of the same touch, seconds: what no pose
 // explains. Only whole touches count. NaN without repeats.
-double NoiseOfRepeats(const std::vector<client::MeasuredTouch>& touches);
+double NoiseOfRepeats(const std::vector<MeasuredTouch>& touches);
 
-}  // namespace touchstone::cli
+}  // namespace touchstone::client
