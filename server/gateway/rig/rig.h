@@ -261,7 +261,9 @@ class Rig : public source::RigDevice {
   std::atomic<uint64_t> stops_{0};    // how often it was stopped: a motion of before a stop never resumes
   mutable std::mutex stop_mutex_;     // of the reason, and of what the journal keeps of it
   std::string stop_reason_;
-  std::string not_released_;  // at the end of it, after a release that could not be written
+  mutable std::mutex stopping_mutex_;  // never held over a write
+  std::string stopping_;               // of a stop whose reason is not kept yet
+  std::string not_released_;           // at the end of it, after a release that could not be written
   int failed_releases_ = 0;
   std::atomic<uint32_t> motions_{0};  // under way
   mutable std::mutex status_mutex_;

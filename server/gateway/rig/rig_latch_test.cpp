@@ -310,6 +310,15 @@ TEST_F(RigLatch, AGatewayThatIsToldToEndLatchesIfSomethingMoved) {
   EXPECT_THAT(rig_->StopReason(), HasSubstr("the gateway was told to end"));
 }
 
+TEST_F(RigLatch, AStopIsNamedBeforeItStopsAnything) {
+  Start();
+  std::string told;  // what a motion that the stop ends at once says
+  arm_->on_stop = [&] { told = rig_->StopReason(); };
+  rig_->Stop("Bo's cable", "ana");
+  EXPECT_EQ(told, "by ana (Bo's cable)");
+  EXPECT_THAT(rig_->StopReason(), HasSubstr("by ana (Bo's cable) at "));
+}
+
 TEST_F(RigLatch, AProgramOfSomebodyElseEndsAMotionAndLatches) {
   Start();
   auto homing = HomeLater();

@@ -39,13 +39,23 @@ absl::StatusOr<std::unique_lock<std::timed_mutex>> Rig::TakeRig(const source::Mo
 StopOutcome Rig::Stop(const std::string& reason, const std::string& who) {
   StopOutcome outcome;
   outcome.motions = motions_;
+  const std::string words = absl::StrCat("by ", who, " (", reason, ")");
+  {
+    // Before anything stops: a touch that the stop ends says who stopped it. The journal's disk may be slow, and comes after.
+    std::lock_guard<std::mutex> lock(stopping_mutex_);
+    stopping_ = words;
+  }
   stopped_ = true;
   ++stops_;
   const double stopped_s = ControllerNowS();
   const absl::Status status = parts_.arm->Stop();
   parts_.changes->Notify();
   if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
-  Latch(absl::StrCat("by ", who, " (", reason, ")"));
+  Latch(words);
+  {
+    std::lock_guard<std::mutex> lock(stopping_mutex_);
+    stopping_.clear();
+  }
   outcome.standstill = ConfirmStandstill(stopped_s);
   if (!outcome.standstill.ok()) spdlog::error("stop: {}", std::string(outcome.standstill.message()));
   audit()
@@ -94,6 +104,10 @@ absl::Status Rig::Reset(const std::string& reason, const std::string& who) {
 }
 
 std::string Rig::StopReason() const {
+  {
+    std::lock_guard<std::mutex> lock(stopping_mutex_);
+    if (!stopping_.empty()) return stopping_;
+  }
   std::lock_guard<std::mutex> lock(stop_mutex_);
   return stop_reason_;
 }
