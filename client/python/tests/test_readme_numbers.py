@@ -21,12 +21,12 @@ def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("readme")
     blocks = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
     lines = [line.partition("  #")[0].strip() for block in blocks for line in block.splitlines()]
-    wanted = re.compile(r"touchstone (model (new|add)|plan lat00|touch --plan plan\.csv --model|compare set\.csv|diagnose set\.csv --model)")
+    wanted = re.compile(r"touchstone (model (new|add)|plan lat00|touch --plan plan\.csv --model|compare set\.csv|diagnose set\.csv --model|propose set|uncertainty)")
     program = str(pathlib.Path(find_server()).parent / "touchstone")
     found = {}
     for line in filter(wanted.match, lines):
         command = [program, *shlex.split(line)[1:]]
-        if "diagnose" in command:
+        if "diagnose" in command and "--json" not in command:
             command += ["--json", "report.json"]
         found[line] = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
     return folder, found
@@ -58,6 +58,18 @@ def test_the_sizes_that_are_found_are_those_of_the_page(printed):
     assert f"{found_mm:g} +-" in shown and f"{found_ms:g} +-" in shown
     planted = " ".join(outputs)
     assert f"radius_mm={planted_mm:g}" in planted and f"sigma_us={1e3 * planted_ms:g}" in planted
+
+
+def test_how_sure_the_predictions_are_is_what_the_page_says(printed):
+    at_plan_ms, at_next_ms, share = said(
+        rf"within a standard uncertainty of {_NUMBER} ms, nearly all of it noise; of the twelve in `next.csv`, chosen for what they "
+        rf"would tell, {_NUMBER} ms, {_NUMBER} % of its square from the tip radius")
+    folder, outputs = printed
+    shown = " ".join(next(text for line, text in outputs.items() if line.startswith("touchstone uncertainty")).split())
+    assert f"standard uncertainty of {at_next_ms:g} ms; {share:g} % of its square is tip_radius" in shown
+    program = str(pathlib.Path(find_server()).parent / "touchstone")
+    again = subprocess.run([program, "uncertainty", "report.json", "plan.csv"], cwd=folder, capture_output=True, text=True, check=True)
+    assert f"standard uncertainty of {at_plan_ms:g} ms" in " ".join(again.stdout.split())
 
 
 def test_what_the_photographs_of_the_page_hid_is_what_made_them():
