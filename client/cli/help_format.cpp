@@ -13,7 +13,8 @@ namespace touchstone::cli {
 namespace {
 
 constexpr size_t kHelpColumn = 32, kNarrowHelpColumn = 26;  // where the texts of options begin
-constexpr size_t kBelowColumn = 6;  // on a narrow terminal, and of what follows a broken example
+constexpr size_t kCommandColumn = 15;  // where the texts of commands begin: two after the longest name
+constexpr size_t kBelowColumn = 6;     // on a narrow terminal, and of what follows a broken example
 constexpr size_t kNarrow = 100, kVeryNarrow = 70;
 
 // Texts of options stand under their names where a terminal has no room beside them.
@@ -99,7 +100,7 @@ class HelpFormat : public CLI::Formatter {
     line = line.substr(0, line.find(". "));
     if (!line.empty() && line.back() == '.') line.pop_back();
     std::string text = "  " + sub->get_name();
-    text.append(text.size() < 14 ? 14 - text.size() : 1, ' ');
+    text.append(text.size() < kCommandColumn ? kCommandColumn - text.size() : 2, ' ');
     return text + Wrap(line, TextWidth(), text.size()) + "\n";
   }
 

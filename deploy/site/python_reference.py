@@ -11,7 +11,7 @@ PAGES = {
     "Datasets": ["Dataset", "Header", "Samples", "Permutation", "Batch", "Columns"],
     "Models and effects": ["Model", "Effect", "Parameter", "Mesh"],
     "Reports": ["Report", "DataReport", "Explanation", "Step", "Value", "Quality", "ComparedValue", "Versus", "Sessions", "Detectable",
-                "Rows", "Tabular"],
+                "UncertaintyBudget", "Rows", "Tabular"],
     "Measured sets": ["Session", "Row", "write_measurements", "touch_id"],
     "Rigs": ["Rig", "TouchCheck"],
     "Errors": ["TouchstoneError", "InvalidRequest", "NotFound", "Refused", "SourceUnreachable", "SourceChanged", "SourceFailed"],

@@ -21,7 +21,8 @@ def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("readme")
     blocks = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
     lines = [line.partition("  #")[0].strip() for block in blocks for line in block.splitlines()]
-    wanted = re.compile(r"touchstone (model (new|add)|plan lat00|touch --plan plan\.csv --model|compare set\.csv|diagnose set\.csv --model|propose set|uncertainty)")
+    wanted = re.compile(r"touchstone (model (new|add)|plan lat00|touch --plan plan\.csv --model|compare set\.csv|diagnose set\.csv --model|"
+                        r"propose set|uncertainty)")
     program = str(pathlib.Path(find_server()).parent / "touchstone")
     found = {}
     for line in filter(wanted.match, lines):
