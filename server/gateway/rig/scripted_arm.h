@@ -133,7 +133,7 @@ class ScriptedArm : public arm::Arm {
   std::function<void()> before_send;
   std::function<void(arm::ArmState*)> while_prepared;  // a state between a program's settings and its motion
   std::atomic<bool> arrives{false};                    // a motion is done as soon as it begins
-  std::function<void()> on_stop;  // called by Stop, if it is set
+  std::function<void()> on_stop;                       // called by Stop, if it is set
   std::atomic<bool> heeds_stops{true}, heeds_other_stops{true};
   std::atomic<int> programs{0}, motions{0}, stops{0}, other_stops{0}, heartbeats{0};
 
