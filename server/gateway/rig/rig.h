@@ -242,6 +242,9 @@ class Rig : public source::RigDevice {
   void EndPausedProgram();
   void WatchSafety();  // the thread
   // Before anything else at the start: latches if a motion was under way when the process before this one ended.
+  // Before anything stops: a motion that is ended says who or what ended it, though the journal, whose disk may be slow, keeps
+  // the reason only later. "": it is kept.
+  void SayWhy(const std::string& what);
   absl::Status LatchInterruption();
   absl::Status LatchUnlessItEnded(uint32_t program_id, const std::string& what);
 

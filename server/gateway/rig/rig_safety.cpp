@@ -40,6 +40,7 @@ std::string PlaceOf(const arm::ArmState& state) {
 }  // namespace
 
 void Rig::Latch(const std::string& what) {
+  SayWhy(what);
   stopped_ = true;
   ++stops_;
   parts_.changes->Notify();
@@ -58,7 +59,13 @@ void Rig::Latch(const std::string& what) {
     const absl::Status kept = unwritten_.SetFacts({{kStopKey, stop_reason_}}, true);
     if (!kept.ok()) spdlog::error("journal: {}", std::string(kept.message()));
   }
+  SayWhy("");
   spdlog::warn("the rig is stopped {}; touchstone rig reset releases it", all);
+}
+
+void Rig::SayWhy(const std::string& what) {
+  std::lock_guard<std::mutex> lock(stopping_mutex_);
+  if (what.empty() || stopping_.empty()) stopping_ = what;
 }
 
 void Rig::LatchLoss(const std::string& what) {

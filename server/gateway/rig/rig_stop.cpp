@@ -40,11 +40,7 @@ StopOutcome Rig::Stop(const std::string& reason, const std::string& who) {
   StopOutcome outcome;
   outcome.motions = motions_;
   const std::string words = absl::StrCat("by ", who, " (", reason, ")");
-  {
-    // Before anything stops: a touch that the stop ends says who stopped it. The journal's disk may be slow, and comes after.
-    std::lock_guard<std::mutex> lock(stopping_mutex_);
-    stopping_ = words;
-  }
+  SayWhy(words);
   stopped_ = true;
   ++stops_;
   const double stopped_s = ControllerNowS();
@@ -52,10 +48,6 @@ StopOutcome Rig::Stop(const std::string& reason, const std::string& who) {
   parts_.changes->Notify();
   if (!status.ok()) spdlog::error("stop: {}", std::string(status.message()));
   Latch(words);
-  {
-    std::lock_guard<std::mutex> lock(stopping_mutex_);
-    stopping_.clear();
-  }
   outcome.standstill = ConfirmStandstill(stopped_s);
   if (!outcome.standstill.ok()) spdlog::error("stop: {}", std::string(outcome.standstill.message()));
   audit()
