@@ -12,7 +12,7 @@
 namespace touchstone::cli {
 namespace {
 
-constexpr size_t kMostShown = 5;  // of what is damaged
+constexpr size_t kMaxDamagesShown = 5;  // of what is damaged
 
 struct VerifyOptions {
   std::string name, in_journal;
@@ -91,10 +91,11 @@ absl::StatusOr<Found> ReadStored(const Cli& cli, const VerifyOptions& options) {
 
 std::string Shown(const std::vector<std::string>& damaged) {
   const std::vector<std::string> first(damaged.begin(),
-                                       damaged.begin() + std::min(damaged.size(), kMostShown));
-  return absl::StrCat(
-      absl::StrJoin(first, "; "),
-      damaged.size() > kMostShown ? absl::StrCat("; and ", damaged.size() - kMostShown, " more") : "");
+                                       damaged.begin() + std::min(damaged.size(), kMaxDamagesShown));
+  return absl::StrCat(absl::StrJoin(first, "; "),
+                      damaged.size() > kMaxDamagesShown
+                          ? absl::StrCat("; and ", damaged.size() - kMaxDamagesShown, " more")
+                          : "");
 }
 
 absl::Status RunVerify(const Cli& cli, const VerifyOptions& options) {

@@ -14,7 +14,7 @@ namespace touchstone::uncertainty {
 namespace {
 
 constexpr double kStepOfFixed = 1e-3;  // of the typical size: the step of a value without a standard error
-constexpr double kLeastDegrees = 2.2;  // of Student's t: with fewer its variance is (nearly) infinite
+constexpr double kMinDegrees = 2.2;    // of Student's t: with fewer its variance is (nearly) infinite
 constexpr double kUniformVariance = 1.0 / 12;  // of an interval of length 1
 
 // Of each finger's error less the mean over the fingers that met the object, for independent errors.
@@ -223,8 +223,8 @@ void PredictedTimes::AddSurface(const effects::TouchBatch& batch, TimeUncertaint
 void PredictedTimes::AddRepeatability(const effects::TouchBatch& batch, TimeUncertainty* result) const {
   const bool silent = !batch.any_noise && batch.wander_sigma_s == 0 && batch.poll_interval_s == 0;
   const double tails = batch.degrees_of_freedom > 0
-                           ? std::max(batch.degrees_of_freedom, kLeastDegrees) /
-                                 (std::max(batch.degrees_of_freedom, kLeastDegrees) - 2)
+                           ? std::max(batch.degrees_of_freedom, kMinDegrees) /
+                                 (std::max(batch.degrees_of_freedom, kMinDegrees) - 2)
                            : 1;
   std::vector<double> variances(batch.fingers());
   for (int touch = 0; touch < batch.size(); ++touch) {

@@ -15,9 +15,8 @@ namespace {
 constexpr int kMaxCovariatesTried = 3;
 constexpr double kSimplerNats = 3;  // an effect must be worth this much beside a curve
 constexpr double kFormulaNats = 5;  // a formula this near says the same in fewer words
-constexpr double kMemoryNats =
-    10;  // a wander must be this much better than a curve, than one step and than a period
-constexpr double kRougherNats = 3;    // ... and than a course without corners
+constexpr double kMemoryNats = 10;  // noise with memory must be ahead of a curve, a step and a period by this
+constexpr double kRougherNats = 3;  // ... and than a course without corners
 constexpr double kOvertakenNats = 3;  // a curve alone that is this much better takes a named effect's place
 
 constexpr double kBeyondWanderNats = 60;  // an effect worth as much is no mean or trend of a wander

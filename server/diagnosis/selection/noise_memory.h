@@ -24,7 +24,7 @@ struct NoiseMemory {
   double step_gain_nats = 0;  // the same of one step of the fingers at the best moment, and no wander
   // The same of a course without corners, a Matern process of order 3/2: a period or a warm-up is one, a wander is not.
   double smooth_gain_nats = 0;
-  // The same of a course that repeats, of any shape: a mean for each of twelve parts of the best period; no wander does.
+  // The same of a course that repeats, of any shape: a mean for each of twelve parts of the best period; noise does not.
   double period_gain_nats = 0;
 };
 
