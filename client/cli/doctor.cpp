@@ -13,9 +13,9 @@
 #include <set>
 #include <thread>
 
-#include "client/cli/child_program.h"
-#include "client/cli/common.h"
-#include "client/cli/terminal.h"
+#include "client/cli/common/child_program.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/terminal.h"
 #include "client/workbench/page.h"
 #include "server/base/status.h"
 #include "server/base/version.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/common.h"
+#include "client/cli/common/common.h"
 #include "client/cli/completion.h"
 #include "server/base/status.h"
 #include "server/base/text.h"

@@ -8,8 +8,8 @@
 #include <cerrno>
 #include <cstdio>
 
-#include "client/cli/common.h"
-#include "client/cli/output_file.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/output_file.h"
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
