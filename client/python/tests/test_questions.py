@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
+import fast_rig
 import touchstone
-
-NOMINAL = "touchstone: model/1\nname: nominal_rig\neffects:\n  - gaussian_noise: {sigma_us: 2000}\n"
-HIDDEN = NOMINAL.replace("nominal_rig", "fast_rig") + "  - speed_error: {relative: 0.08}\n"
+from fast_rig import HIDDEN, NOMINAL
 
 
 @pytest.fixture(scope="module")
@@ -16,13 +15,7 @@ def client(server):
 
 @pytest.fixture(scope="module")
 def measured(client, tmp_path_factory):
-    """24 poses of lat20 in two rounds, by a rig that is too fast."""
-    touches = client.plan(touchstone.faces(samples_per_face=4, rounds=2), "lat20", count=48)
-    batch = client.touch("lat20", touches, model=HIDDEN, seed=1)
-    path = tmp_path_factory.mktemp("questions") / "set.csv"
-    touchstone.write_measurements(path, [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(batch["contact_time_us"][k]))
-                                         for k in range(len(touches))])
-    return path
+    return fast_rig.measure(client, tmp_path_factory.mktemp("questions") / "set.csv")
 
 
 def test_a_check_says_from_which_size_each_effect_is_found(client, measured):

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fast_rig
 import touchstone
+from fast_rig import HIDDEN, NOMINAL
 from touchstone import report_parts, tabular
 from touchstone.report import Report
 from touchstone.v1 import diagnosis_pb2
-
-NOMINAL = "touchstone: model/1\nname: nominal_rig\neffects:\n  - gaussian_noise: {sigma_us: 2000}\n"
-HIDDEN = NOMINAL.replace("nominal_rig", "fast_rig") + "  - speed_error: {relative: 0.08}\n"
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +24,7 @@ def client(server):
 
 @pytest.fixture(scope="module")
 def measured(client, tmp_path_factory):
-    """24 poses of lat20 in two rounds, by a rig that is too fast."""
-    touches = client.plan(touchstone.faces(samples_per_face=4, rounds=2), "lat20", count=48)
-    batch = client.touch("lat20", touches, model=HIDDEN, seed=1)
-    path = tmp_path_factory.mktemp("tabular") / "set.csv"
-    touchstone.write_measurements(path, [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(batch["contact_time_us"][k]))
-                                         for k in range(len(touches))])
-    return path
+    return fast_rig.measure(client, tmp_path_factory.mktemp("tabular") / "set.csv")
 
 
 @pytest.fixture(scope="module")

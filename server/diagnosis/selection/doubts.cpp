@@ -7,12 +7,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/selection/session_order.h"
+
 namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr int kManyEffects = 3;      // more at once need a reason
 constexpr double kNearTypical = 5;   // sizes over the typical one that are near it
 constexpr double kMaxUnusual = 0.9;  // ... of one that would be larger than rigs show
+// Probability of either of two effects that two speeds cannot tell from another.
+constexpr double kMaxAtTwoSpeeds = 0.5;
 
 // The largest value of the effect over the size that rigs show.
 double SizeOverTypical(const engine::Fit& fit, int index) {
@@ -58,8 +62,8 @@ void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::Select
   }
 }
 
-Doubts DoubtsOf(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps, Ladder* ladder) {
-  Doubts doubts;
+std::string StrangeValuesInWords(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                                 Ladder* ladder) {
   int effects = 0, near_typical = 0;
   std::vector<std::string> stopped;
   for (const engine::SelectedStep& selected : steps) {
@@ -72,16 +76,34 @@ Doubts DoubtsOf(const engine::Fit& fit, const std::vector<engine::SelectedStep>&
       if (step.effect == name)
         engine::AddWords("The value is at the catalogue's bound: the data ask for one beyond it.", &step);
   }
-  doubts.at_bound = !stopped.empty();
-  doubts.many_strange = effects > kManyEffects && near_typical == 0;
-  if (doubts.at_bound)
-    doubts.words = absl::StrCat("The data ask for more of ", absl::StrJoin(stopped, ", "),
-                                " than the catalogue allows: a value at its bound explains nothing.");
-  else if (doubts.many_strange)
-    doubts.words =
-        absl::StrCat("It would take ", effects,
-                     " effects at once, none near the size that rigs show: something else is wrong.");
-  return doubts;
+  if (!stopped.empty())
+    return absl::StrCat("The data ask for more of ", absl::StrJoin(stopped, ", "),
+                        " than the catalogue allows: a value at its bound explains nothing.");
+  if (effects > kManyEffects && near_typical == 0)
+    return absl::StrCat("It would take ", effects,
+                        " effects at once, none near the size that rigs show: something else is wrong.");
+  return "";
+}
+
+void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
+                    const std::vector<engine::SelectedStep>& steps, Ladder* ladder) {
+  // The touch of each row of the search.
+  std::vector<int> touches;
+  for (const int t : workspace.contrasts->touch_of_row())
+    touches.push_back(workspace.contrasts->touches()[t]);
+  const auto name_of = [&](size_t step) {
+    return engine::NameOf(*fit.model.base().effects[steps[step].effect].effect);
+  };
+  for (const auto& [one, other] : PairsAtTwoSpeeds(*workspace.searched, touches, fit, steps)) {
+    const std::string names[] = {name_of(one), name_of(other)};
+    for (engine::LadderStep& step : ladder->steps) {
+      if (step.effect != names[0] && step.effect != names[1]) continue;
+      engine::AddWords(absl::StrCat("At two speeds, whatever depends on the speed is some sum of ", names[0],
+                                    " and ", names[1], ": measure at a third one."),
+                       &step);
+      step.probability = std::min(step.probability, kMaxAtTwoSpeeds);
+    }
+  }
 }
 
 }  // namespace touchstone::diagnosis::selection

@@ -8,20 +8,18 @@
 
 namespace touchstone::diagnosis::selection {
 
-struct Doubts {
-  bool at_bound = false;      // a value is at the bound of its effect: the data ask for more
-  bool many_strange = false;  // more than three effects at once, none near the size that rigs show
-  bool remounted = false;     // the object lay elsewhere in every round: repeats differ by more than noise
-  std::string words;          // a sentence for people; empty if there is no doubt
-
-  bool any() const { return at_bound || many_strange || remounted; }
-};
-
-// Of the steps that the ladder has so far; those at a bound say so in their words.
-Doubts DoubtsOf(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps, Ladder* ladder);
+// Of the steps that the ladder has so far, a sentence for people where values end at their bounds, which their words say too,
+// or where more than three effects are needed at once and none is near the size that rigs show; empty: neither.
+std::string StrangeValuesInWords(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                                 Ladder* ladder);
 
 // Says of steps that they would need more than rigs show, and is less sure of them.
 void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
                         Ladder* ladder);
+
+// The same of two effects that two speeds cannot tell from a third dependence on the speed. `fit`: on the touches of the
+// search.
+void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
+                    const std::vector<engine::SelectedStep>& steps, Ladder* ladder);
 
 }  // namespace touchstone::diagnosis::selection
