@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-import fast_rig
 import touchstone
-from fast_rig import HIDDEN, NOMINAL
+
+NOMINAL = "touchstone: model/1\nname: nominal_rig\neffects:\n  - gaussian_noise: {sigma_us: 2000}\n"
+HIDDEN = NOMINAL.replace("nominal_rig", "fast_rig") + "  - speed_error: {relative: 0.08}\n"
 
 
 @pytest.fixture(scope="module")
@@ -14,8 +15,9 @@ def client(server):
 
 
 @pytest.fixture(scope="module")
-def measured(client, tmp_path_factory):
-    return fast_rig.measure(client, tmp_path_factory.mktemp("questions") / "set.csv")
+def measured(client, two_rounds):
+    """By a rig that is too fast."""
+    return two_rounds(client, HIDDEN)
 
 
 def test_a_check_says_from_which_size_each_effect_is_found(client, measured):

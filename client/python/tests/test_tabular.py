@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import fast_rig
 import touchstone
-from fast_rig import HIDDEN, NOMINAL
 from touchstone import report_parts, tabular
 from touchstone.report import Report
 from touchstone.v1 import diagnosis_pb2
+
+NOMINAL = "touchstone: model/1\nname: nominal_rig\neffects:\n  - gaussian_noise: {sigma_us: 2000}\n"
+HIDDEN = NOMINAL.replace("nominal_rig", "fast_rig") + "  - speed_error: {relative: 0.08}\n"
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +24,9 @@ def client(server):
 
 
 @pytest.fixture(scope="module")
-def measured(client, tmp_path_factory):
-    return fast_rig.measure(client, tmp_path_factory.mktemp("tabular") / "set.csv")
+def measured(client, two_rounds):
+    """By a rig that is too fast."""
+    return two_rounds(client, HIDDEN)
 
 
 @pytest.fixture(scope="module")
