@@ -214,6 +214,11 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
   request.session = message.session();
   request.ids.assign(message.touch_ids().begin(), message.touch_ids().end());
   request.series = message.series();
+  if (message.has_previous()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(touch::CommandedTouch touch,
+                                FromProto(message.previous().touch(), "previous.touch"));
+    request.previous = {message.previous().object(), std::move(touch)};
+  }
   return request;
 }
 

@@ -80,13 +80,12 @@ absl::StatusOr<v1::ModelRef> ParseModelRef(const std::string& text) {
       text.find('/') != std::string::npos || path.extension() == ".yaml" || path.extension() == ".yml";
   if (looks_like_file) {
     TOUCHSTONE_ASSIGN_OR_RETURN(*ref.mutable_yaml(), ReadFile(text, kMaxModelBytes));
+    // What is wrong with it is said here, where the file has a name.
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const model::Model model,
+        model::ParseModel(ref.yaml(), text, effects::Catalogue(), model::FilesBeside(text)));
     // A server cannot read files that a model names: their content goes along.
-    if (absl::StrContains(ref.yaml(), "surface_map")) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          const model::Model model,
-          model::ParseModel(ref.yaml(), text, effects::Catalogue(), model::FilesBeside(text)));
-      ref.set_yaml(model::FormatModel(model));
-    }
+    if (absl::StrContains(ref.yaml(), "surface_map")) ref.set_yaml(model::FormatModel(model));
     return ref;
   }
   std::error_code ignored;

@@ -9,6 +9,7 @@
 #include "client/cli/options/touch_options.h"
 #include "client/source/lab_units.h"
 #include "client/source/measurement_csv.h"
+#include "client/source/session_parts.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/touch_limits.h"
@@ -77,9 +78,8 @@ absl::Status AimRows(const TouchOptions& options, client::Connection* connection
   return absl::OkStatus();
 }
 
-// Rows of one object that follow each other are one session; the noise depends on the row's number alone. A
-// physical source gets one at a time, with ids: those of a plan's touches are always the same, so that a
-// repeated command resumes where it stopped.
+// All rows are one session; the noise depends on the row's number alone. A physical source gets one at a time, with
+// ids: those of a plan's touches are always the same, so that a repeated command resumes where it stopped.
 absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<TouchRow>* rows,
                       std::string* model_hash) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ModelRef model, ParseModelRef(options.model));
@@ -94,23 +94,20 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
   const StopOnInterrupt stop_on_interrupt(source.get());
   const std::string session = options.motion.session.empty() ? "default" : options.motion.session;
   const size_t max_touches = source->touches_per_request();
+  std::vector<client::MeasuredTouch> commanded;
+  for (const TouchRow& row : *rows) commanded.push_back(row.measured);
   std::set<std::string> said;
   for (size_t first = 0; first < rows->size();) {
-    v1::TouchRequest request;
-    request.set_object((*rows)[first].measured.object);
+    v1::TouchRequest request = client::PartOfSession(commanded, first, max_touches);
+    const size_t stop = first + static_cast<size_t>(request.touches_size());
     *request.mutable_model() = model;
     request.set_seed(options.seed);
-    request.set_first_index(first);
-    if (source->physical()) request.set_session(session);
-    size_t stop = first;
-    while (stop < rows->size() && stop - first < max_touches &&
-           (*rows)[stop].measured.object == request.object()) {
-      const TouchRow& row = (*rows)[stop++];
-      *request.add_touches() = row.measured.commanded;
-      if (source->physical())
+    if (source->physical()) {
+      request.set_session(session);
+      for (size_t k = first; k < stop; ++k)
         request.add_touch_ids(options.plan.empty()
-                                  ? client::NewTouchId(row.measured.touch)
-                                  : client::TouchId(session, row.measured.object, row.planned));
+                                  ? client::NewTouchId((*rows)[k].measured.touch)
+                                  : client::TouchId(session, request.object(), (*rows)[k].planned));
     }
     bar.ShowStage(absl::StrCat("touch ", first + 1, " of ", rows->size(), ": ", request.object()),
                   static_cast<double>(first) / static_cast<double>(rows->size()));

@@ -10,6 +10,7 @@
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/diagnosis/rehearsal.h"
 #include "client/source/measurement_csv.h"
+#include "client/source/session_parts.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 
@@ -100,15 +101,10 @@ absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& 
   std::vector<client::MeasuredTouch> measured = plan;
   constexpr size_t kPerRequest = 1000;
   for (size_t first = 0, stop = 0; first < measured.size(); first = stop) {
-    v1::TouchRequest request;
-    request.set_object(measured[first].object);
+    v1::TouchRequest request = client::PartOfSession(measured, first, kPerRequest);
+    stop = first + static_cast<size_t>(request.touches_size());
     request.mutable_model()->set_yaml(model::FormatModel(hidden.model));
     request.set_seed(seed);
-    request.set_first_index(first);
-    for (stop = first; stop < measured.size() && stop - first < kPerRequest &&
-                       measured[stop].object == measured[first].object;
-         ++stop)
-      *request.add_touches() = measured[stop].commanded;
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchResponse response,
                                 connection->Call(&v1::Source::Stub::Touch, request));
     for (size_t k = first; k < stop; ++k) {

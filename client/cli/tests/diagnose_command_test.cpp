@@ -275,6 +275,32 @@ TEST_F(DiagnoseCommandTest, AUsersFormulaMayStandAlone) {
   EXPECT_THAT(wrong.err, AllOf(HasSubstr("mine.yaml"), HasSubstr("fingr")));
 }
 
+// Kind: a session of several objects is touched in parts, and what a touch leaves behind must not end with a part.
+TEST_F(DiagnoseCommandTest, TouchesOfSeveralObjectsAreOneSession) {
+  Write("memory.yaml",
+        "touchstone: model/1\nname: memory\neffects:\n  - return_hysteresis: {fraction: 0.02}\n"
+        "  - formula: {name: rest, adds: travel_mm, expression: \"0.01 * finger * pause_s\"}\n");
+  ASSERT_EQ(Run({"plan", "lat00,lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2",
+                 "--touch-interval-s", "8", "-o", "plan.csv"})
+                .exit_code,
+            0);
+  auto touches = client::ParseMeasurements(Read("plan.csv"), "plan.csv");
+  ASSERT_TRUE(touches.ok()) << touches.status();
+  const size_t of_each = touches->size() / 2;
+  std::vector<client::MeasuredTouch> by_turns;
+  for (size_t k = 0; k < of_each; ++k)
+    for (const size_t row : {k, of_each + k}) {
+      by_turns.push_back((*touches)[row]);
+      by_turns.back().touch = by_turns.size() - 1;
+      by_turns.back().commanded.set_session_time_s(7.0 * by_turns.size() + (k % 3));
+    }
+  Write("by_turns.csv", client::FormatMeasurements(by_turns));
+  ASSERT_EQ(Run({"touch", "--plan", "by_turns.csv", "--model", "memory.yaml", "-o", "set.csv"}).exit_code, 0);
+  const Outcome compared = Run({"compare", "set.csv", "--model", "memory.yaml", "--json", "-"});
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_LT(Json::parse(compared.out)["data"][0]["initial"]["rmse"].get<double>(), 0.01) << "us";
+}
+
 TEST_F(DiagnoseCommandTest, HelpBeginsWithExamples) {
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"compare"}, {"diagnose"}, {"propose"}, {"session"}, {"session", "create"}}) {

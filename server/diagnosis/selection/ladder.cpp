@@ -15,6 +15,7 @@
 #include "server/diagnosis/selection/climb.h"
 #include "server/diagnosis/selection/doubts.h"
 #include "server/diagnosis/selection/hypotheses.h"
+#include "server/diagnosis/selection/lopsided_scatter.h"
 #include "server/diagnosis/selection/model_posterior.h"
 #include "server/diagnosis/selection/pose_scatter.h"
 #include "server/diagnosis/selection/round_structure.h"
@@ -23,6 +24,7 @@
 #include "server/diagnosis/selection/touches_set_aside.h"
 #include "server/diagnosis/selection/uneven_scatter.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
+#include "server/diagnosis/touches/noise_sample.h"
 #include "server/diagnosis/touches/ticks.h"
 #include "server/effects/all_effects.h"
 
@@ -212,8 +214,7 @@ class LadderBuilder {
   void AddNoise() {
     if (found_.Allows(Question::kNoise) && !ladder_.noise_floor.is_rounding) {
       touches::NoiseFindings noise = selection_.noise;
-      AskUnevenScatter();
-      if (uneven_ && !uneven_->tails_remain) noise.degrees_of_freedom = {};
+      AskUnevenScatter(&noise);
       AddNoiseSteps(std::move(noise), selection_.memory.has_value(), &ladder_);
     }
     DoubtNoise();
@@ -222,16 +223,29 @@ class LadderBuilder {
 
   // Where something else makes touches scatter, parts of the set scatter differently for that reason; repeats know nothing
   // of a misfit.
-  void AskUnevenScatter() {
+  void AskUnevenScatter(touches::NoiseFindings* noise) {
     const bool misfit = found_.Has(Hypothesis::kFormula) || found_.Has(Hypothesis::kMisfit) ||
                         found_.Has(Hypothesis::kUnplaced) || found_.Leave(Leaves::kDoubts) ||
                         selection_.fit.hypothesis != 0;
     if (!found_.Allows(Question::kUnevenScatter) || (!ladder_.noise_floor.from_repeats && misfit)) return;
-    uneven_ = FindUnevenScatter(observations_, ladder_.prediction, ladder_.residuals, selection_.noise);
-    if (uneven_)
-      found_.Add(Hypothesis::kUnevenScatter, uneven_->words, [this](engine::UnexplainedRest* rest) {
-        NameUnevenScatter(*uneven_, found_.Leave(Leaves::kMeans), rest);
-      });
+    const touches::NoiseSample sample =
+        touches::MakeNoiseSample(observations_, ladder_.residuals, ladder_.prediction);
+    uneven_ = FindUnevenScatter(observations_, ladder_.prediction, sample, selection_.noise);
+    if (!uneven_) return AskLopsidedScatter(sample, noise);
+    found_.Add(Hypothesis::kUnevenScatter, uneven_->words, [this](engine::UnexplainedRest* rest) {
+      NameUnevenScatter(*uneven_, found_.Leave(Leaves::kMeans), rest);
+    });
+    if (!uneven_->tails_remain) noise->degrees_of_freedom = {};
+    if (uneven_->finger >= 0) noise->channel_sigma_s.clear();
+  }
+
+  // What reaches farther to one side looks heavy-tailed.
+  void AskLopsidedScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
+    if (selection_.noise.poll_interval_s.gain_nats > 0) return;
+    const auto lopsided = FindLopsidedScatter(sample.groups);
+    if (!lopsided) return;
+    found_.Add(Hypothesis::kLopsided, lopsided->words);
+    noise->degrees_of_freedom = {};
   }
 
   // Of the steps of noise, what an object that moves would look like.

@@ -13,18 +13,37 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kMinGainNats = 10;
+constexpr double kMotionNats = 10;
 constexpr double kAheadOfNoiseNats = 4;
 constexpr double kMinScatterDegrees = 60;
 constexpr int kRatios = 48;  // of the two scatters' squares that are tried
 constexpr double kSmallestRatio = 0.01, kLargestRatio = 100;
 
+// Of a pose, of a translation along the row of fingers and across it, of a tilt of the row, of the speed.
+enum MotionColumn { kAlong = kPoseValues, kAcross, kTilt, kSpeed, kMotionColumns };
+
 // One touch: its residuals less the mean over its pose, and what a motion changes of them.
 struct Repeat {
   Eigen::VectorXd residual;  // scaled to the variance of one touch
-  Eigen::MatrixXd columns;   // fingers x (kPoseValues + 2): and along the row of fingers, and across it
+  Eigen::MatrixXd columns;   // fingers x kMotionColumns
   double weight = 1;         // degrees of freedom per finger
 };
+
+// Changes of the fingers' times, s per m, rad and relative change of the speed, less their mean.
+Eigen::MatrixXd MotionColumns(const touches::Observations& o, const touches::Prediction& d, int k) {
+  Eigen::MatrixXd columns(o.fingers, static_cast<int>(kMotionColumns));
+  columns.leftCols(kPoseValues) = PoseColumns(o, d, k);
+  const Eigen::Vector3d& lateral = o.set->lateral[o.row[k]];
+  columns.col(kAlong) = columns.leftCols(3) * lateral;
+  columns.col(kAcross) = columns.leftCols(3) * o.set->approach[o.row[k]].cross(lateral);
+  for (int i = 0; i < o.fingers; ++i) {
+    const size_t e = static_cast<size_t>(k) * o.fingers + i;
+    columns(i, kTilt) = lateral.dot(d.contact_m[e]) * d.inverse_speed_s_per_m[e];
+    columns(i, kSpeed) = d.travel_m[e] * d.inverse_speed_s_per_m[e];
+  }
+  columns.rightCols(2).rowwise() -= columns.rightCols(2).colwise().mean().eval();
+  return columns;
+}
 
 std::vector<Repeat> RepeatsOf(const touches::Observations& o, const touches::Prediction& d,
                               const std::vector<double>& residuals) {
@@ -41,13 +60,8 @@ std::vector<Repeat> RepeatsOf(const touches::Observations& o, const touches::Pre
     };
     for (const int k : members) mean += of_touch(k) / count;
     for (const int k : members) {
-      const Eigen::MatrixXd pose_columns = PoseColumns(o, d, k);
-      const Eigen::Vector3d& lateral = o.set->lateral[o.row[k]];
-      Repeat repeat{(of_touch(k) - mean) / std::sqrt(1 - 1 / count),
-                    Eigen::MatrixXd(o.fingers, kPoseValues + 2), 1 - 1 / count};
-      repeat.columns << pose_columns, pose_columns.leftCols(3) * lateral,
-          pose_columns.leftCols(3) * o.set->approach[o.row[k]].cross(lateral);
-      repeats.push_back(std::move(repeat));
+      repeats.push_back(
+          {(of_touch(k) - mean) / std::sqrt(1 - 1 / count), MotionColumns(o, d, k), 1 - 1 / count});
     }
   }
   return repeats;
@@ -105,22 +119,44 @@ Fit FitMotion(const std::vector<Direction>& directions) {
   return best;
 }
 
+enum class MotionUnit { kMillimetres, kDegrees, kPercent };
+
 struct Motion {
   int first, columns;
+  MotionUnit unit;
   const char* words;
 };
-constexpr Motion kMotions[] = {{0, 1, "along x"},
-                               {1, 1, "along y"},
-                               {2, 1, "along z"},
-                               {0, 3, "in any direction"},
-                               {3, 1, "about x"},
-                               {4, 1, "about y"},
-                               {5, 1, "about z"},
-                               {kPoseValues, 1, "along the row of fingers"},
-                               {kPoseValues + 1, 1, "across the row of fingers"}};
+constexpr Motion kMotions[] = {{0, 1, MotionUnit::kMillimetres, "along x"},
+                               {1, 1, MotionUnit::kMillimetres, "along y"},
+                               {2, 1, MotionUnit::kMillimetres, "along z"},
+                               {0, 3, MotionUnit::kMillimetres, "in any direction"},
+                               {3, 1, MotionUnit::kDegrees, "about x"},
+                               {4, 1, MotionUnit::kDegrees, "about y"},
+                               {5, 1, MotionUnit::kDegrees, "about z"},
+                               {kAlong, 1, MotionUnit::kMillimetres, "along the row of fingers"},
+                               {kAcross, 1, MotionUnit::kMillimetres, "across the row of fingers"},
+                               {kTilt, 1, MotionUnit::kDegrees, "tilted against the approach"},
+                               {kSpeed, 1, MotionUnit::kPercent, ""}};
 
-bool IsRotation(const Motion& motion) {
-  return motion.first >= 3 && motion.first < kPoseValues;
+std::string MotionInWords(const Motion& motion, double size, bool ahead) {
+  const char* noise = ahead ? "less well" : "about as well";
+  if (motion.unit == MotionUnit::kPercent)
+    return absl::StrFormat(
+        "Repeats scatter as if the arm had another speed at every touch, by about %.2g %% (standard "
+        "deviation): "
+        "an arm that does not keep its speed, or a clock that does not. Noise of the fingers explains that "
+        "%s. "
+        "Record the arm's speed during an approach, and touch at another speed.",
+        size * 100, noise);
+  const bool turns = motion.unit == MotionUnit::kDegrees;
+  return absl::StrFormat(
+      "Repeats scatter as if the object or the tool lay elsewhere at every touch, by about %.2g %s %s "
+      "(standard "
+      "deviation): play of the arm, or a loose mount. Noise of the fingers explains that %s. Hold a gauge to "
+      "the "
+      "tool and to the object, and touch from one side only.",
+      size * (turns ? 1 / kRadiansPerDegree : kMillimetresPerMetre), turns ? "deg" : "mm", motion.words,
+      noise);
 }
 
 }  // namespace
@@ -128,7 +164,8 @@ bool IsRotation(const Motion& motion) {
 std::optional<PoseScatter> FindPoseScatter(const touches::Observations& o, const touches::Prediction& d,
                                            const std::vector<double>& residuals,
                                            const touches::NoiseFindings& noise) {
-  if (o.fingers < 2 || d.contact_m.size() != residuals.size() || d.normal.size() != residuals.size())
+  if (o.fingers < 2 || d.contact_m.size() != residuals.size() || d.travel_m.size() != residuals.size() ||
+      d.normal.size() != residuals.size())
     return std::nullopt;
   const std::vector<Repeat> repeats = RepeatsOf(o, d, residuals);
   double degrees = 0;
@@ -143,18 +180,10 @@ std::optional<PoseScatter> FindPoseScatter(const touches::Observations& o, const
   double noise_nats =
       noise.slope.gain_nats + noise.degrees_of_freedom.gain_nats + noise.length_sigma_m.gain_nats;
   if (!noise.channel_sigma_s.empty()) noise_nats += noise.channel_sigma_s[0].gain_nats;
-  if (motion == nullptr || best.gain_nats < std::max(kMinGainNats, noise_nats - kAheadOfNoiseNats))
+  if (motion == nullptr || best.gain_nats < std::max(kMotionNats, noise_nats - kAheadOfNoiseNats))
     return std::nullopt;
-  const bool turns = IsRotation(*motion);
   PoseScatter found{best.motion, best.gain_nats, best.gain_nats > noise_nats + kAheadOfNoiseNats, ""};
-  found.words = absl::StrFormat(
-      "Repeats scatter as if the object or the tool lay elsewhere at every touch, by about %.2g %s %s "
-      "(standard "
-      "deviation): play of the arm, or a loose mount. Noise of the fingers explains that %s. Hold a gauge to "
-      "the "
-      "tool and to the object, and touch from one side only.",
-      best.motion * (turns ? 1 / kRadiansPerDegree : kMillimetresPerMetre), turns ? "deg" : "mm",
-      motion->words, found.ahead ? "less well" : "about as well");
+  found.words = MotionInWords(*motion, best.motion, found.ahead);
   return found;
 }
 

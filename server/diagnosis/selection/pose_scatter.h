@@ -1,5 +1,5 @@
-// Whether repeats scatter as if the object, or the tool, lay elsewhere at every touch: play, a loose mount. Such a scatter
-// grows on slopes and differs between fingers, and is neither of the two noises.
+// Whether repeats scatter as if the object, or the tool, lay elsewhere at every touch, or the arm had another speed: play, a
+// loose mount. Such a scatter grows on slopes and differs between fingers, and is neither of the two noises.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@
 namespace touchstone::diagnosis::selection {
 
 struct PoseScatter {
-  double size = 0;       // standard deviation, m or rad
+  double size = 0;       // standard deviation: m, rad, or a share of the speed
   double gain_nats = 0;  // over noise that is the same for all fingers (BIC)
   bool ahead = false;    // of noise of the fingers; false: the two explain the scatter about as well
   std::string words;     // sentences for people

@@ -13,7 +13,6 @@
 
 #include "server/base/distributions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/touches/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -25,6 +24,7 @@ using touches::ReadingGroup;
 constexpr double kUnevenNats = 10;
 constexpr double kUnevenRatio = 4.0 / 3;  // of the largest scale over the smallest
 constexpr double kTailsWithinNats = 10;   // that tails within the parts must earn
+constexpr double kOneFingerNats = 3;      // by which one finger must be ahead of all together
 constexpr size_t kRepeatsAsked = 60;      // groups, for repeats to be asked
 constexpr int kMinTouchesOfPart = 15;
 constexpr int kMaxParts = 24;
@@ -200,45 +200,69 @@ std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& gro
   return found;
 }
 
-std::string ScatterInWords(const UnevenScatter& found, const std::string& by,
-                           const std::vector<std::string>& alike) {
+// What is compared: every finger, or one against the mean of the others, where what scatters is this finger alone.
+struct View {
+  int finger = -1;
+  std::vector<ReadingGroup> groups;
+  NoiseModel model;
+};
+
+View OneAgainstOthers(const std::vector<ReadingGroup>& groups, const NoiseModel& model, int finger) {
+  View view{finger, {}, model};
+  const auto scale = [&](int channel) {
+    return model.channel_scale.empty() ? 1.0 : model.channel_scale[channel];
+  };
+  double others_squared = 0;
+  for (const ReadingGroup& group : groups) {
+    const size_t n = group.residual_s.size();
+    const auto own = std::find(group.channel.begin(), group.channel.end(), finger);
+    if (own == group.channel.end() || n < 3) continue;
+    const size_t at = static_cast<size_t>(own - group.channel.begin());
+    const double others = static_cast<double>(n - 1);
+    double residual_s = 0, growth = 0, squared = 0;
+    for (size_t i = 0; i < n; ++i) {
+      if (i == at) continue;
+      residual_s += group.residual_s[i] / others, growth += group.growth[i] / others;
+      squared += std::pow(scale(group.channel[i]) / others, 2);
+    }
+    others_squared = std::max(others_squared, squared);
+    view.groups.push_back({group.index,
+                           {group.residual_s[at], residual_s},
+                           {group.growth[at], growth},
+                           {0, 1},
+                           group.slowness});
+  }
+  view.model.channel_scale = {scale(finger), std::sqrt(others_squared)};
+  return view;
+}
+
+std::string ScatterInWords(const UnevenScatter& found, const std::string& by, int fingers) {
   std::vector<std::string> parts;
   for (const UnevenScatter::Part& part : found.parts)
     parts.push_back(absl::StrFormat("%s %.2g ms", part.name, part.scale_s * 1e3));
-  std::string words = absl::StrCat("The times scatter by an amount that depends on ", by, ": ",
-                                   absl::StrJoin(parts, ", "), ".");
-  if (!alike.empty()) {
-    std::string same = absl::StrJoin(alike, " and ");
-    same[0] = absl::ascii_toupper(same[0]);
-    absl::StrAppend(&words, " ", same, " would say nearly the same: touch in another order.");
-  }
-  return words +
-         " No noise of the catalogue does. Find what differs there, or diagnose the parts by themselves.";
+  const std::string whose =
+      found.finger < 0 ? "" : absl::StrCat(" of finger ", model::FingerName(found.finger, fingers));
+  return absl::StrCat("The times", whose, " scatter by an amount that depends on ", by, ": ",
+                      absl::StrJoin(parts, ", "), ".");
 }
 
-}  // namespace
+std::string AlikeInWords(const std::vector<std::string>& alike) {
+  if (alike.empty()) return "";
+  std::string same = absl::StrJoin(alike, " and ");
+  same[0] = absl::ascii_toupper(same[0]);
+  return absl::StrCat(" ", same, " would say nearly the same: touch in another order.");
+}
 
-std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& o, const touches::Prediction& d,
-                                               const std::vector<double>& residuals,
-                                               const touches::NoiseFindings& noise) {
-  if (d.travel_m.size() != residuals.size() || noise.poll_interval_s.gain_nats > 0) return std::nullopt;
-  const touches::NoiseSample sample = touches::MakeNoiseSample(o, residuals, touches::TangentsOfIncidence(d),
-                                                               touches::ExpectedReadings(o, d));
-  const std::vector<ReadingGroup>& source =
-      sample.repeats.size() >= kRepeatsAsked ? sample.repeats : sample.groups;
-  // What a mean over repeats has followed says nothing of their scatter.
-  const double own_share = &source == &sample.repeats ? OwnScatterShare(o, source) : 1;
-  std::vector<ReadingGroup> groups;
-  const size_t kept = std::min(source.size(), kMaxScatterGroups);
-  for (size_t j = 0; j < kept; ++j) groups.push_back(source[source.size() * j / kept]);
-
+// The partition that one scatter describes worst; nothing where none does. `tried`: comparisons in all.
+std::optional<UnevenScatter> WorstPartition(const View& view, const std::vector<Partition>& partitions,
+                                            double own_share, double tried, int fingers) {
   std::vector<UnevenScatter> found;
   std::vector<std::string> by;
-  const std::vector<Partition> partitions = PartitionsOf(o, d);
   for (const Partition& partition : partitions) {
-    std::optional<UnevenScatter> here = CompareScatter(groups, partition, noise.model, own_share);
+    std::optional<UnevenScatter> here = CompareScatter(view.groups, partition, view.model, own_share);
     if (!here) continue;
-    here->test.p = std::min(1.0, here->test.p * static_cast<double>(partitions.size()));
+    here->finger = view.finger;
+    here->test.p = std::min(1.0, here->test.p * tried);
     found.push_back(*std::move(here));
     by.push_back(partition.by);
   }
@@ -253,8 +277,40 @@ std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& o, c
     scatter.alike.push_back(found[j].test);
     alike.push_back(by[j]);
   }
-  scatter.words = ScatterInWords(scatter, by[best], alike);
+  scatter.words = absl::StrCat(
+      ScatterInWords(scatter, by[best], fingers), AlikeInWords(alike),
+      " No noise of the catalogue does. Find what differs there, or diagnose the parts by themselves.");
   return std::move(scatter);
+}
+
+}  // namespace
+
+std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& o, const touches::Prediction& d,
+                                               const touches::NoiseSample& sample,
+                                               const touches::NoiseFindings& noise) {
+  if (d.travel_m.size() != static_cast<size_t>(o.size()) * o.fingers || noise.poll_interval_s.gain_nats > 0)
+    return std::nullopt;
+  const std::vector<ReadingGroup>& source =
+      sample.repeats.size() >= kRepeatsAsked ? sample.repeats : sample.groups;
+  // What a mean over repeats has followed says nothing of their scatter.
+  const double own_share = &source == &sample.repeats ? OwnScatterShare(o, source) : 1;
+  std::vector<ReadingGroup> groups;
+  const size_t kept = std::min(source.size(), kMaxScatterGroups);
+  for (size_t j = 0; j < kept; ++j) groups.push_back(source[source.size() * j / kept]);
+
+  const std::vector<Partition> partitions = PartitionsOf(o, d);
+  std::vector<View> views = {{-1, groups, noise.model}};
+  if (o.fingers > 2)
+    for (int finger = 0; finger < o.fingers; ++finger)
+      views.push_back(OneAgainstOthers(groups, noise.model, finger));
+  const double tried = static_cast<double>(partitions.size() * views.size());
+  std::optional<UnevenScatter> worst;
+  for (const View& view : views) {
+    std::optional<UnevenScatter> here = WorstPartition(view, partitions, own_share, tried, o.fingers);
+    if (here && (!worst || here->test.gain_nats > worst->test.gain_nats + kOneFingerNats))
+      worst = std::move(here);
+  }
+  return worst;
 }
 
 void NameUnevenScatter(const UnevenScatter& scatter, bool rest_of_means, engine::UnexplainedRest* rest) {

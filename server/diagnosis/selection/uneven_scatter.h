@@ -1,5 +1,5 @@
 // Whether the scatter of the times differs between parts of a set: one object, one stretch of the session, one round, one
-// speed, far and near, touches from above and from below. Parts that scatter differently make the tails of the whole look
+// speed, far and near, touches from above and from below; of all fingers or of one. Parts that scatter differently make the tails of the whole look
 // heavy, and are no noise of the catalogue.
 #pragma once
 
@@ -20,6 +20,7 @@ struct UnevenScatter {
     double scale_s = 0;
     int touches = 0;
   };
+  int finger = -1;  // whose scatter it is; -1: of all
   std::vector<Part> parts;
   engine::CovariateTest
       test;  // the covariate, its p-value over all that were tried, the gain over one scatter (BIC)
@@ -29,12 +30,12 @@ struct UnevenScatter {
   std::string words;          // sentences for people
 };
 
-// `residuals` [k * fingers + i] of the best model, with `details` of it; `noise`: found in the same residuals; what of the
+// `sample`: of the residuals of the best model, with `details` of it; `noise`: found in the same residuals; what of the
 // scatter it explains (growth, fingers, lengths) is no difference between parts. Where there are repeats they are asked,
 // which no misfit touches. Nothing where one scatter says the same, or the scales differ by less than a third.
 std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& observations,
                                                const touches::Prediction& details,
-                                               const std::vector<double>& residuals,
+                                               const touches::NoiseSample& sample,
                                                const touches::NoiseFindings& noise);
 
 // Puts its covariates among those of the rest: in front, unless the means have a `rest` too.

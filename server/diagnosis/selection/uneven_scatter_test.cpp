@@ -26,11 +26,10 @@ touches::SyntheticSet SetWith(const std::function<double(const touches::Syntheti
 }
 
 std::optional<UnevenScatter> Found(const touches::SyntheticSet& set) {
-  const touches::NoiseFindings noise = touches::FindNoise(
-      touches::MakeNoiseSample(set.observations, set.residuals, touches::TangentsOfIncidence(set.prediction),
-                               touches::ExpectedReadings(set.observations, set.prediction)),
-      0);
-  return FindUnevenScatter(set.observations, set.prediction, set.residuals, noise);
+  const touches::NoiseFindings noise =
+      touches::FindNoise(touches::MakeNoiseSample(set.observations, set.residuals, set.prediction), 0);
+  return FindUnevenScatter(set.observations, set.prediction,
+                           touches::MakeNoiseSample(set.observations, set.residuals, set.prediction), noise);
 }
 
 TEST(UnevenScatter, OneObjectThatScattersMoreIsNamed) {
@@ -51,6 +50,18 @@ TEST(UnevenScatter, ScatterThatGrowsThroughTheSessionIsNamed) {
   EXPECT_THAT(found->test.name, AnyOf("session_time_s", "round"));
   ASSERT_EQ(found->parts.size(), 4u);
   EXPECT_LT(found->parts[0].scale_s, found->parts[3].scale_s);
+}
+
+TEST(UnevenScatter, OneFingerThatScattersMoreFromSomeTimeOnIsNamed) {
+  touches::SyntheticSet set(1, 60, 3, touches::kSyntheticSigmaS, 4);
+  RandomStream random(4, RandomDomain::kTest);
+  for (int k = 130; k < set.size(); ++k)
+    set.observations.time_s[k * 3 + 2] += 3 * touches::kSyntheticSigmaS * random.Normal();
+  set.Finish();
+  const auto found = Found(set);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->finger, 2);
+  EXPECT_THAT(found->words, HasSubstr("The times of finger r scatter by an amount that depends on"));
 }
 
 TEST(UnevenScatter, IsFoundWithoutRepeats) {
