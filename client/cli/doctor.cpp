@@ -22,7 +22,7 @@
 #include "server/diagnosis/boards/board_pictures.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
-#include "server/service/channel.h"
+#include "server/service/channel/channel.h"
 
 namespace touchstone::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
-#include "server/service/man_page.h"
+#include "server/service/options/man_page.h"
 
 namespace touchstone::cli {
 namespace {

@@ -13,7 +13,7 @@
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/access_file.h"
+#include "server/service/core/access_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -14,7 +14,7 @@
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/image/encode.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 
 namespace touchstone::cli {
 namespace {

@@ -20,7 +20,7 @@
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
-#include "server/service/evidence.h"
+#include "server/service/calls/evidence.h"
 
 namespace touchstone::cli {
 namespace {

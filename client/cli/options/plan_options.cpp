@@ -13,7 +13,7 @@
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 #include "server/session/images_csv.h"
 
 namespace touchstone::cli {

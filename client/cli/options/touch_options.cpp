@@ -7,7 +7,7 @@
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 
 namespace touchstone::cli {
 namespace {

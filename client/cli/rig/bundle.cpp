@@ -8,7 +8,7 @@
 #include "client/cli/session/journal_session.h"
 #include "server/base/status.h"
 #include "server/gateway/bundle/make_bundle.h"
-#include "server/service/resources.h"
+#include "server/service/core/resources.h"
 
 namespace touchstone::cli {
 namespace {

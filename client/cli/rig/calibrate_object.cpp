@@ -13,7 +13,7 @@
 #include "server/gateway/calibration/object_registration.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 
 namespace touchstone::cli {
 namespace {

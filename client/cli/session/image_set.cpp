@@ -11,7 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/image/photograph.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 #include "server/session/camera_yaml.h"
 #include "server/session/emulated.h"
 #include "server/session/image_set_file.h"

@@ -13,7 +13,7 @@
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/stored_session.h"
+#include "server/service/sessions/stored_session.h"
 #include "server/session/image_set_file.h"
 #include "server/session/image_set_hdf5.h"
 

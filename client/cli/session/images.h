@@ -7,7 +7,7 @@
 
 #include "client/cli/common/common.h"
 #include "client/source/connection.h"
-#include "server/service/stored_session.h"
+#include "server/service/sessions/stored_session.h"
 
 namespace touchstone::cli {
 

@@ -11,7 +11,7 @@
 #include "client/cli/session/journal_session.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/measured_set_message.h"
+#include "server/service/sessions/measured_set_message.h"
 #include "server/session/image_set_file.h"
 
 namespace touchstone::cli {

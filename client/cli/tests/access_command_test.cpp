@@ -4,9 +4,9 @@
 #include <sys/stat.h>
 
 #include "client/cli/tests/real_binary_test.h"
-#include "server/service/access_file.h"
-#include "server/service/server.h"
-#include "server/service/test_certificates.h"
+#include "server/service/core/access_file.h"
+#include "server/service/rpc/server.h"
+#include "server/service/tests/test_certificates.h"
 
 namespace touchstone::cli {
 namespace {

@@ -15,7 +15,7 @@
 #include "client/cli/tests/test_server.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/text.h"
-#include "server/service/server.h"
+#include "server/service/rpc/server.h"
 
 namespace touchstone::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/check.h"
-#include "server/service/server.h"
+#include "server/service/rpc/server.h"
 
 namespace touchstone::cli {
 
