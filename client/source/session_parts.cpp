@@ -1,6 +1,13 @@
 #include "client/source/session_parts.h"
 
+#include <algorithm>
+
 namespace touchstone::client {
+namespace {
+
+constexpr size_t kPrevious = 2;  // that act on what follows
+
+}  // namespace
 
 v1::TouchRequest PartOfSession(const std::vector<MeasuredTouch>& session, size_t first, size_t max_touches) {
   v1::TouchRequest request;
@@ -10,9 +17,10 @@ v1::TouchRequest PartOfSession(const std::vector<MeasuredTouch>& session, size_t
     if (session[k].object != session[first].object) break;
     *request.add_touches() = session[k].commanded;
   }
-  if (first > 0) {
-    request.mutable_previous()->set_object(session[first - 1].object);
-    *request.mutable_previous()->mutable_touch() = session[first - 1].commanded;
+  for (size_t k = first - std::min(first, kPrevious); k < first; ++k) {
+    v1::PreviousTouch* previous = request.add_previous();
+    previous->set_object(session[k].object);
+    *previous->mutable_touch() = session[k].commanded;
   }
   return request;
 }

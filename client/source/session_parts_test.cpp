@@ -19,15 +19,17 @@ TEST(SessionParts, APartEndsWhereTheObjectChanges) {
   const v1::TouchRequest request = PartOfSession(session, 0, 100);
   EXPECT_EQ(request.object(), "a");
   EXPECT_EQ(request.touches_size(), 2);
-  EXPECT_FALSE(request.has_previous());
+  EXPECT_EQ(request.previous_size(), 0);
 }
 
-TEST(SessionParts, APartKnowsTheTouchBeforeItWhateverItsObject) {
+TEST(SessionParts, APartKnowsTheTwoTouchesBeforeItWhateverTheirObject) {
   const auto session = SessionOf({"a", "a", "b", "a"});
-  const v1::TouchRequest request = PartOfSession(session, 2, 100);
-  EXPECT_EQ(request.first_index(), 2u);
-  EXPECT_EQ(request.previous().object(), "a");
-  EXPECT_EQ(request.previous().touch().session_time_s(), 1);
+  const v1::TouchRequest request = PartOfSession(session, 3, 100);
+  EXPECT_EQ(request.first_index(), 3u);
+  ASSERT_EQ(request.previous_size(), 2);
+  EXPECT_EQ(request.previous(0).object(), "a");
+  EXPECT_EQ(request.previous(1).object(), "b");
+  EXPECT_EQ(request.previous(1).touch().session_time_s(), 2);
 }
 
 TEST(SessionParts, APartOfManyTouchesOfOneObjectGoesOnFromTheOneBefore) {
@@ -35,7 +37,8 @@ TEST(SessionParts, APartOfManyTouchesOfOneObjectGoesOnFromTheOneBefore) {
   const v1::TouchRequest request = PartOfSession(session, 2, 2);
   EXPECT_EQ(PartOfSession(session, 0, 2).touches_size(), 2);
   EXPECT_EQ(request.touches_size(), 1);
-  EXPECT_EQ(request.previous().touch().session_time_s(), 1);
+  ASSERT_EQ(request.previous_size(), 2);
+  EXPECT_EQ(request.previous(1).touch().session_time_s(), 1);
 }
 
 }  // namespace

@@ -74,8 +74,8 @@ struct TouchRequest {
   uint64_t first_index = 0;      // touch k draws the random numbers of index first_index + k
   std::string session;           // that a physical source journals in; empty: "default"
   std::vector<std::string> ids;  // one per touch, or none
-  std::optional<PreviousTouch>
-      previous;         // that the session made before these; a physical source knows its own
+  // The last two that the session made before these; a physical source knows its own.
+  std::vector<PreviousTouch> previous;
   bool series = false;  // a physical source also keeps and gives the arm's states during each approach
 };
 

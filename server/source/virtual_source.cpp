@@ -30,9 +30,9 @@ absl::Status FillBlock(const TouchRequest& request, const ServedObject& object, 
   for (int k = 0; k < count; ++k) {
     const touch::CommandedTouch& touch = request.touches[begin + k];
     touch::SetTouch(touch, request.first_index + begin + k, k, batch);
-    const touch::CommandedTouch* before = begin + k > 0      ? &request.touches[begin + k - 1]
-                                          : request.previous ? &request.previous->touch
-                                                             : nullptr;
+    const touch::CommandedTouch* before = begin + k > 0               ? &request.touches[begin + k - 1]
+                                          : !request.previous.empty() ? &request.previous.back().touch
+                                                                      : nullptr;
     if (before != nullptr)
       batch->pause_s[k] = touch::PauseBetween(before->session_time_s, touch.session_time_s);
     if (!simulator.needed_covariates().empty())
@@ -110,11 +110,12 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
   results.fingers = model->fingers;
   results.model = model;
   std::vector<double> press_m(model->fingers, 0.0);  // of the touch before the block
-  if (request.previous && simulator.needs_previous_press()) {
+  if (!request.previous.empty() && simulator.needs_previous_press()) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* before,
-                                objects().Find(request.previous->object, "previous.object"));
+                                objects().Find(request.previous.back().object, "previous.object"));
     TouchRequest alone;
-    alone.touches = {request.previous->touch};
+    alone.touches = {request.previous.back().touch};
+    alone.previous.assign(request.previous.begin(), request.previous.end() - 1);
     TOUCHSTONE_RETURN_IF_ERROR(FillBlock(alone, *before, 0, 1, simulator, &batch));
     TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
     press_m = batch.press_m;

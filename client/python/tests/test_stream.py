@@ -1,5 +1,6 @@
 """Datasets from a real server: contents, parts, errors."""
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -138,6 +139,19 @@ def test_a_start_inside_of_the_object_is_warned_of(client):
     inside = touchstone.touches(target_mm=(0, 0, 0), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=20)
     with pytest.warns(UserWarning, match="starts inside of 'lat20': a standoff of 20 mm"):
         client.touch("lat20", inside)
+
+
+def test_touches_in_two_calls_are_those_of_one(client):
+    """What a touch leaves in the fingers, and the pause since, do not end with a call."""
+    remembers = ("touchstone: model/1\nname: remembers\neffects:\n  - return_hysteresis: {fraction: 0.02}\n"
+                 "  - formula: {name: rest, adds: travel_mm, expression: \"0.01 * finger * pause_s\"}\n")
+    touches = dataclasses.replace(client.plan(touchstone.faces(samples_per_face=2, rounds=1), "lat20", count=12),
+                                  session_time_s=np.cumsum(np.arange(6.0, 18.0)))
+    whole = client.touch("lat20", touches, model=remembers)["contact_time_us"]
+    later = client.touch("lat20", touches[5:], model=remembers, start=5, previous=("lat20", touches[:5]))["contact_time_us"]
+    np.testing.assert_array_equal(whole[5:], later)
+    alone = client.touch("lat20", touches[5:], model=remembers, start=5)["contact_time_us"]
+    assert (alone[:2] != later[:2]).any(axis=1).all() and (alone[2:] == later[2:]).all()
 
 
 def test_the_catalogue_and_the_store_are_readable(client, tmp_path):

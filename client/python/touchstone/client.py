@@ -251,8 +251,8 @@ class Client(Diagnosis):
             that the call is repeated when the source was lost; without ids it is not.
           series: a physical source also keeps and gives the arm's states during each approach (`measured[k].series`,
             touchstone.v1.TouchSeries), about 200 kB a touch.
-          previous: (object, touches): the last of these was made before, in the same session. What it leaves in the fingers of
-            a virtual source (return_hysteresis), and the pause since, act on the first touch.
+          previous: (object, touches) that the session made before these. What the last one leaves in the fingers of a virtual
+            source (return_hysteresis), and the pause since, act on the first touch.
 
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
@@ -270,8 +270,8 @@ class Client(Diagnosis):
             series=series,
         )
         if previous is not None:
-            request.previous.object = previous[0]
-            request.previous.touch.CopyFrom(previous[1][-1:].to_messages()[0])
+            request.previous.extend(source_pb2.PreviousTouch(object=previous[0], touch=touch)
+                                    for touch in previous[1][-2:].to_messages())
         with contextlib.nullcontext() if lease_token else self._leased() as lease:
             reply = self._touch(request, lease)
         for note in reply.notes:

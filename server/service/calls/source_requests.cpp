@@ -17,6 +17,8 @@
 namespace touchstone::service {
 namespace {
 
+constexpr int kMaxPrevious = 2;
+
 // Of a field that 0 leaves as it is. What an int does not hold is refused here, as it was sent.
 absl::Status SetIfGiven(uint32_t sent, absl::string_view field, int* value) {
   constexpr int kMax = std::numeric_limits<int>::max();
@@ -214,10 +216,15 @@ absl::StatusOr<source::TouchRequest> FromProto(const v1::TouchRequest& message, 
   request.session = message.session();
   request.ids.assign(message.touch_ids().begin(), message.touch_ids().end());
   request.series = message.series();
-  if (message.has_previous()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(touch::CommandedTouch touch,
-                                FromProto(message.previous().touch(), "previous.touch"));
-    request.previous = {message.previous().object(), std::move(touch)};
+  if (message.previous_size() > kMaxPrevious)
+    return absl::InvalidArgumentError(absl::StrCat("previous has ", message.previous_size(),
+                                                   " touches: at most ", kMaxPrevious,
+                                                   ", the last ones, act on what follows"));
+  for (int k = 0; k < message.previous_size(); ++k) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        touch::CommandedTouch touch,
+        FromProto(message.previous(k).touch(), absl::StrCat("previous[", k, "].touch")));
+    request.previous.push_back({message.previous(k).object(), std::move(touch)});
   }
   return request;
 }

@@ -242,7 +242,7 @@ class LadderBuilder {
   // What reaches farther to one side looks heavy-tailed.
   void AskLopsidedScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
     if (selection_.noise.poll_interval_s.gain_nats > 0) return;
-    const auto lopsided = FindLopsidedScatter(sample.groups);
+    const auto lopsided = FindLopsidedScatter(sample.groups, observations_.fingers);
     if (!lopsided) return;
     found_.Add(Hypothesis::kLopsided, lopsided->words);
     noise->degrees_of_freedom = {};

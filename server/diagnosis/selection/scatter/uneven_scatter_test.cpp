@@ -53,9 +53,9 @@ TEST(UnevenScatter, ScatterThatGrowsThroughTheSessionIsNamed) {
 }
 
 TEST(UnevenScatter, OneFingerThatScattersMoreFromSomeTimeOnIsNamed) {
-  touches::SyntheticSet set(1, 60, 3, touches::kSyntheticSigmaS, 4);
+  touches::SyntheticSet set(1, 60, 6, touches::kSyntheticSigmaS, 4);
   RandomStream random(4, RandomDomain::kTest);
-  for (int k = 130; k < set.size(); ++k)
+  for (int k = 240; k < set.size(); ++k)
     set.observations.time_s[k * 3 + 2] += 3 * touches::kSyntheticSigmaS * random.Normal();
   set.Finish();
   const auto found = Found(set);
