@@ -17,7 +17,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/provenance.h"
 #include "client/cli/terminal.h"
-#include "client/cli/whole_number.h"
+#include "server/base/whole_number.h"
 #include "client/source/lease_keeper.h"
 #include "server/base/printable.h"
 #include "server/base/status.h"
