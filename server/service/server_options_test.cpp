@@ -77,15 +77,19 @@ TEST(ServerFlags, CountsAreReadAsPeopleWriteThem) {
 }
 
 TEST(ServerFlags, WhatIsNoCountIsRefusedAsItWasSent) {
-  for (const auto& [text, complaint] : std::map<const char*, const char*>{
-           {"1.5", "'1.5' is no whole number"}, {"-ten", "'-ten' is no whole number"}, {"0x10", "'0x10' is no whole"},
-           {"1e10", "'1e10' is out of range"}, {"-1e99", "'-1e99' is out of range"}}) {
+  for (const auto& [text, complaint] :
+       std::map<const char*, const char*>{{"1.5", "'1.5' is no whole number"},
+                                          {"-ten", "'-ten' is no whole number"},
+                                          {"0x10", "'0x10' is no whole"},
+                                          {"1e10", "'1e10' is out of range"},
+                                          {"-1e99", "'-1e99' is out of range"}}) {
     const char* arguments[] = {"touchstone-server", "--max-session-touches", text};
     EXPECT_THAT(std::string(ParseServerFlags(3, arguments).status().message()),
                 testing::AllOf(HasSubstr("--max-session-touches"), HasSubstr(complaint)));
   }
   ServerFlags flags;
-  EXPECT_THAT(std::string(ApplyToml("threads = 1.5\n", "server.toml", &flags).message()), HasSubstr("whole number"));
+  EXPECT_THAT(std::string(ApplyToml("threads = 1.5\n", "server.toml", &flags).message()),
+              HasSubstr("whole number"));
   for (const char* text : {"1e10", "-1e300", "nan", "inf", "9223372036854775807"})
     EXPECT_THAT(std::string(ApplyToml(absl::StrCat("threads = ", text), "server.toml", &flags).message()),
                 HasSubstr("whole number"))

@@ -398,7 +398,7 @@ TEST_F(EmulatedArm, SoftwareWithoutItsRegistersIsNamedWithItsVersionAndWhatWould
 // An arm without power.
 class UnpoweredArm : public testing::Test {
  protected:
-  static constexpr double kSpeedup = 8;  // a controller boots for longer than it takes to connect to it again
+  static constexpr double kSpeedup = 20;
   UnpoweredArm() {
     rig::ControllerOptions options;
     options.model = "ur3";

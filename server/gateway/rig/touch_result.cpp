@@ -187,10 +187,10 @@ bool IsBeforeTheTurn(const TouchRecording& record, uint64_t ticks) {
   const std::vector<arm::ArmState> states = ApproachStates(record);
   if (states.empty() || !record.controller_clock.valid || !record.effector_clock.valid) return false;
   const double controller_s = ControllerTimeS(record, ticks);
-  const double host_s =
-      kSigmas * std::hypot(HostUncertaintyS(record.effector_clock, static_cast<double>(ticks) / record.tick_hz),
-                           HostUncertaintyS(record.controller_clock, controller_s)) +
-      kBusyHostS;
+  const double host_s = kSigmas * std::hypot(HostUncertaintyS(record.effector_clock,
+                                                              static_cast<double>(ticks) / record.tick_hz),
+                                             HostUncertaintyS(record.controller_clock, controller_s)) +
+                        kBusyHostS;
   return controller_s < states.back().controller_time_s - host_s * record.controller_clock.rate;
 }
 
@@ -208,7 +208,8 @@ std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, doub
       finger.ticks = *ticks;
       finger.contact_time_s = (device_s - began_device_s) / device_rate * record.time_scale;
       if (synchronised) {
-        if (const auto pose = PoseAt(record.states, ControllerTimeS(record, *ticks), 0.1 * std::max(1.0, record.time_scale)))
+        if (const auto pose = PoseAt(record.states, ControllerTimeS(record, *ticks),
+                                     0.1 * std::max(1.0, record.time_scale)))
           finger.base_from_tip = geometry::PoseVectorOf(*pose);
       }
     }

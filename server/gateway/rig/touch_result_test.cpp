@@ -137,9 +137,10 @@ TEST(TouchResult, AFingerThatLetGoBeforeTheToolTurnedBackIsNamed) {
   EXPECT_TRUE(CheckHeld(LetGo(4)).ok()) << CheckHeld(LetGo(4));
   const absl::Status refused = CheckHeld(LetGo(1.5));
   EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(refused.message()),
-              testing::HasSubstr("finger 2 let go 250 ms after it had reported a contact, while the tool still "
-                                 "approached"));
+  EXPECT_THAT(
+      std::string(refused.message()),
+      testing::HasSubstr("finger 2 let go 250 ms after it had reported a contact, while the tool still "
+                         "approached"));
 }
 
 TEST(TouchResult, ThatAFingerLetGoTooEarlyIsClaimedOnlyIfItIsCertain) {
