@@ -28,7 +28,7 @@ constexpr double kStillS = 0.05;  // controller time over which the joints must 
 constexpr double kStillRad =
     3e-4;  // over that; noise of a standing joint is about 2.3e-5 (tests/rig/controller)
 constexpr double kStillGapS = 10;  // controller time between two states that still tell of a standstill
-constexpr double kGoneS = 0.3;   // without a state of the controller
+constexpr double kGoneS = 0.3;     // without a state of the controller
 
 bool IsPaused(arm::RuntimeState state) {
   return state == arm::RuntimeState::kPausing || state == arm::RuntimeState::kPaused ||
@@ -231,8 +231,9 @@ absl::Status Rig::ConfirmStandstill(double from_s) {
     const double now_s = NowS();
     if (now.ok()) heard_s = now_s;
     if (now.ok() && now->controller_time_s < from_s) from_s = now->controller_time_s;  // started anew
-    if (now.ok() && StandsStill(*now, parts_.arm->History(std::max(from_s, now->controller_time_s - kStillGapS),
-                                                          now->controller_time_s)))
+    if (now.ok() &&
+        StandsStill(*now, parts_.arm->History(std::max(from_s, now->controller_time_s - kStillGapS),
+                                              now->controller_time_s)))
       return absl::OkStatus();
     if (!otherwise && now_s - began_s > kFirstWayS) {
       otherwise = true;
