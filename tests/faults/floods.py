@@ -298,6 +298,8 @@ def _beside(flood: Flood, source: str, attacked: Attacked, connections: int, sec
                 waits.append(s)
                 result.expect(not wrong, f"{name}: {method}: {wrong}")
             rss = max(rss, server.resident_bytes() >> 20)
+        # 0: it came to its end a moment before this.
+        result.expect(flooding.poll() in (None, 0), f"{name}: the flood itself ended with {flooding.poll()}")
         if not server.alive():
             result.failures.append(f"{name}: the server ended with {server.process.returncode}")
             return
