@@ -8,6 +8,7 @@ import functools
 import os
 import pathlib
 import re
+import select
 import socket
 import ssl
 import struct
@@ -202,18 +203,36 @@ def _connect(host: str, port: int, tls: bool) -> socket.socket:
     return context.wrap_socket(connection)
 
 
+def _send_and_swallow(connection: socket.socket, data: bytes, reads: bool) -> None:
+    """As sendall() beside _swallow() of a connection with TLS, which two threads may not use at once."""
+    view = memoryview(data)
+    while view:
+        with contextlib.suppress(ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            view = view[connection.send(view):]
+        with contextlib.suppress(ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            while reads:
+                if not connection.recv(1 << 16):
+                    raise ConnectionResetError
+        if view:
+            select.select([connection] if reads else [], [connection], [], 0.1)
+
+
 def _send(flood: Flood, host: str, port: int, tls: bool, until: float) -> None:
     """One connection at a time; a new one when the server closes it."""
     while time.monotonic() < until:
         try:
             with _connect(host, port, tls) as connection:
-                if flood.reads:
+                send = connection.sendall
+                if tls:
+                    connection.setblocking(False)
+                    send = functools.partial(_send_and_swallow, connection, reads=flood.reads)
+                elif flood.reads:
                     threading.Thread(target=_swallow, args=(connection,), daemon=True).start()
-                connection.sendall(PREFACE + frame(SETTINGS, 0, 0))
+                send(PREFACE + frame(SETTINGS, 0, 0))
                 for piece in flood.frames(flood.method):
                     if time.monotonic() >= until:
                         return
-                    connection.sendall(piece)
+                    send(piece)
         except OSError:
             time.sleep(0.01)
 
