@@ -17,9 +17,18 @@ using testing::HasSubstr;
 
 class UnexpectedStart : public Latch {
  protected:
-  // A program of somebody else, over the interface that anybody on the network can use.
+  // A program of somebody else, over the interface that anybody on the network can use. Whoever hangs up with states unread
+  // before it was taken resets the connection, and the program is lost.
   void SendForeign(const std::string& program) {
-    rig::TestClient(emulator_->controller().ports().secondary).Send(program);
+    const size_t commands = CommandCount();
+    rig::TestClient somebody(emulator_->controller().ports().secondary);
+    somebody.Send(program);
+    WaitUntil(
+        [&] {
+          const std::vector<std::string> since = CommandsSince(commands);
+          return std::find(since.begin(), since.end(), "program swing") != since.end();
+        },
+        "the controller has the program");
   }
   // Whatever the touch became: nothing moves any more, and nothing that retries changes that.
   void ExpectLatchedAndAtRest(const std::string& because) {
