@@ -2,8 +2,8 @@
 #include <malloc.h>
 
 #include "server/base/out_of_memory.h"
-#include "server/service/gateway_server.h"
-#include "server/service/process.h"
+#include "server/service/gateway/gateway_server.h"
+#include "server/service/rpc/process.h"
 
 int main(int argc, char** argv) {
   using namespace touchstone;

@@ -1,8 +1,8 @@
 // touchstone-server: the virtual source as a process. Options come from flags and a TOML file; flags win.
 #include "server/base/out_of_memory.h"
-#include "server/service/process.h"
-#include "server/service/server.h"
-#include "server/service/server_flags.h"
+#include "server/service/rpc/process.h"
+#include "server/service/rpc/server.h"
+#include "server/service/rpc/server_flags.h"
 
 int main(int argc, char** argv) {
   using namespace touchstone;

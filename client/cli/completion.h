@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "client/cli/common.h"
+#include "client/cli/common/common.h"
 
 namespace touchstone::cli {
 

@@ -8,11 +8,11 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include "client/cli/browser.h"
-#include "client/cli/child_program.h"
-#include "client/cli/common.h"
-#include "client/cli/interrupt.h"
-#include "client/cli/provenance.h"
+#include "client/cli/common/browser.h"
+#include "client/cli/common/child_program.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/interrupt.h"
+#include "client/cli/common/provenance.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

@@ -13,16 +13,16 @@
 #include <set>
 #include <thread>
 
-#include "client/cli/child_program.h"
-#include "client/cli/common.h"
-#include "client/cli/terminal.h"
+#include "client/cli/common/child_program.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/terminal.h"
 #include "client/workbench/page.h"
 #include "server/base/status.h"
 #include "server/base/version.h"
 #include "server/diagnosis/boards/board_pictures.h"
 #include "server/geometry/surface.h"
 #include "server/image/renderer.h"
-#include "server/service/channel.h"
+#include "server/service/channel/channel.h"
 
 namespace touchstone::cli {
 namespace {

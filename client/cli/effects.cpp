@@ -1,6 +1,6 @@
 // touchstone effects: the catalogue, and what one effect is.
-#include "client/cli/common.h"
-#include "client/cli/terminal.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/terminal.h"
 #include "client/workbench_server/formula_words.h"
 #include "server/base/status.h"
 #include "server/base/text.h"

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/common.h"
+#include "client/cli/common/common.h"
 #include "client/cli/completion.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
-#include "server/service/man_page.h"
+#include "server/service/options/man_page.h"
 
 namespace touchstone::cli {
 namespace {

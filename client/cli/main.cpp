@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "client/cli/common.h"
-#include "client/cli/exit_code.h"
-#include "client/cli/interrupt.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/exit_code.h"
+#include "client/cli/common/interrupt.h"
 #include "server/base/out_of_memory.h"
 
 namespace touchstone::cli {

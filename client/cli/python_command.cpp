@@ -10,8 +10,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
-#include "client/cli/child_program.h"
-#include "client/cli/common.h"
+#include "client/cli/common/child_program.h"
+#include "client/cli/common/common.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

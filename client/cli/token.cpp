@@ -8,12 +8,12 @@
 #include <cerrno>
 #include <cstdio>
 
-#include "client/cli/common.h"
-#include "client/cli/output_file.h"
+#include "client/cli/common/common.h"
+#include "client/cli/common/output_file.h"
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/access_file.h"
+#include "server/service/core/access_file.h"
 
 namespace touchstone::cli {
 namespace {

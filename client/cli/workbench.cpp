@@ -4,8 +4,8 @@
 #include <iostream>
 #include <mutex>
 
-#include "client/cli/browser.h"
-#include "client/cli/comparison.h"
+#include "client/cli/common/browser.h"
+#include "client/cli/diagnosis/comparison.h"
 #include "client/workbench_server/workbench.h"
 #include "server/base/status.h"
 

@@ -12,8 +12,8 @@
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "server/base/out_of_memory.h"
 #include "server/base/text.h"
-#include "server/service/channel.h"
-#include "server/service/man_page.h"
+#include "server/service/channel/channel.h"
+#include "server/service/options/man_page.h"
 
 namespace {
 

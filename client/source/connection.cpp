@@ -8,8 +8,8 @@
 
 #include "client/source/tls_probe.h"
 #include "server/base/status.h"
-#include "server/service/channel.h"
-#include "server/service/host_port.h"
+#include "server/service/channel/channel.h"
+#include "server/service/channel/host_port.h"
 
 namespace touchstone::client {
 namespace {

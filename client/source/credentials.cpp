@@ -10,8 +10,8 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/service/channel.h"
-#include "server/service/host_port.h"
+#include "server/service/channel/channel.h"
+#include "server/service/channel/host_port.h"
 
 namespace touchstone::client {
 namespace {

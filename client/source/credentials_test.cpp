@@ -9,8 +9,8 @@
 
 #include "client/source/connection.h"
 #include "server/base/file_writer.h"
-#include "server/service/access.h"
-#include "server/service/test_certificates.h"
+#include "server/service/core/access.h"
+#include "server/service/tests/test_certificates.h"
 
 namespace touchstone::client {
 namespace {

@@ -13,7 +13,7 @@
 #include "client/source/errors.h"
 #include "server/base/manual_clock.h"
 #include "server/base/test_tier.h"
-#include "server/service/server.h"
+#include "server/service/rpc/server.h"
 
 namespace touchstone::client {
 namespace {

@@ -13,7 +13,7 @@
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
 #include "server/geometry/pose.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 #include "server/session/base_pose.h"
 #include "server/session/command_bytes.h"
 

@@ -4,6 +4,7 @@
 
 #include "client/source/connection.h"
 #include "client/source/measurement_csv.h"
+#include "client/source/session_parts.h"
 #include "server/base/status.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
@@ -31,22 +32,21 @@ absl::StatusOr<v1::Evidence> ExampleEvidence() {
     plan.set_count(kTouchesPerObject);
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ExpandPlanResponse planned,
                                 connection->Call(&v1::Source::Stub::ExpandPlan, plan));
-    v1::TouchRequest request;
-    request.set_object(object);
+    const size_t first = touches.size();
+    for (const v1::CommandedTouch& commanded : planned.touches()) {
+      touches.emplace_back();
+      touches.back().touch = touches.size() - 1;
+      touches.back().object = object;
+      touches.back().commanded = commanded;
+    }
+    v1::TouchRequest request = client::PartOfSession(touches, first, kTouchesPerObject);
     request.mutable_model()->set_yaml(model::FormatModel(hidden));
     request.set_seed(kSeed);
-    request.set_first_index(touches.size());
-    *request.mutable_touches() = planned.touches();
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchResponse made,
                                 connection->Call(&v1::Source::Stub::Touch, request));
-    for (int i = 0; i < planned.touches_size(); ++i) {
-      client::MeasuredTouch touch;
-      touch.touch = touches.size();
-      touch.object = object;
-      touch.commanded = planned.touches(i);
-      touch.time_s.assign(made.results(i).contact_time_s().begin(), made.results(i).contact_time_s().end());
-      touches.push_back(std::move(touch));
-    }
+    for (int i = 0; i < made.results_size(); ++i)
+      touches[first + static_cast<size_t>(i)].time_s.assign(made.results(i).contact_time_s().begin(),
+                                                            made.results(i).contact_time_s().end());
   }
   v1::Evidence evidence;
   evidence.set_csv(client::FormatMeasurements(touches));

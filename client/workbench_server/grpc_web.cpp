@@ -13,7 +13,7 @@
 #include <optional>
 
 #include "server/base/printable.h"
-#include "server/service/access_roles.h"
+#include "server/service/options/access_roles.h"
 
 namespace touchstone::workbench {
 namespace {

@@ -40,7 +40,7 @@ std::string PercentEncoded(absl::string_view text);
 std::optional<std::chrono::nanoseconds> ParseTimeout(absl::string_view text);
 
 // Whether the bridge forwards "/package.Service/Method". What is inside of this process asks for no credentials, so the bridge
-// asks by itself: what a reader may do at a rig (server/service/access_roles.cpp) is forwarded, and nothing else.
+// asks by itself: what a reader may do at a rig (server/service/options/access_roles.cpp) is forwarded, and nothing else.
 // PERMISSION_DENIED says which role it takes; UNIMPLEMENTED: no service has it.
 absl::Status CheckMethod(absl::string_view path);
 

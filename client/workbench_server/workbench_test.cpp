@@ -16,7 +16,7 @@
 #include "client/workbench_server/grpc_web.h"
 #include "server/base/test_paths.h"
 #include "server/base/text.h"
-#include "server/service/server.h"
+#include "server/service/rpc/server.h"
 
 namespace touchstone::workbench {
 namespace {

@@ -61,6 +61,11 @@ struct ExpandedPlan {
   std::vector<std::string> notes;  // what is odd about them (touch/touch_notes.h)
 };
 
+struct PreviousTouch {
+  std::string object;
+  touch::CommandedTouch touch;  // made exact
+};
+
 struct TouchRequest {
   std::string object;
   std::vector<touch::CommandedTouch> touches;  // made exact
@@ -69,6 +74,8 @@ struct TouchRequest {
   uint64_t first_index = 0;      // touch k draws the random numbers of index first_index + k
   std::string session;           // that a physical source journals in; empty: "default"
   std::vector<std::string> ids;  // one per touch, or none
+  std::optional<PreviousTouch>
+      previous;         // that the session made before these; a physical source knows its own
   bool series = false;  // a physical source also keeps and gives the arm's states during each approach
 };
 

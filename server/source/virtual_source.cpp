@@ -30,9 +30,11 @@ absl::Status FillBlock(const TouchRequest& request, const ServedObject& object, 
   for (int k = 0; k < count; ++k) {
     const touch::CommandedTouch& touch = request.touches[begin + k];
     touch::SetTouch(touch, request.first_index + begin + k, k, batch);
-    if (begin + k > 0)
-      batch->pause_s[k] =
-          touch::PauseBetween(request.touches[begin + k - 1].session_time_s, touch.session_time_s);
+    const touch::CommandedTouch* before = begin + k > 0      ? &request.touches[begin + k - 1]
+                                          : request.previous ? &request.previous->touch
+                                                             : nullptr;
+    if (before != nullptr)
+      batch->pause_s[k] = touch::PauseBetween(before->session_time_s, touch.session_time_s);
     if (!simulator.needed_covariates().empty())
       TOUCHSTONE_RETURN_IF_ERROR(touch::SetCovariates(simulator.needed_covariates(), touch,
                                                       absl::StrCat("touches[", begin + k, "]"), k, batch));
@@ -108,6 +110,15 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
   results.fingers = model->fingers;
   results.model = model;
   std::vector<double> press_m(model->fingers, 0.0);  // of the touch before the block
+  if (request.previous && simulator.needs_previous_press()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* before,
+                                objects().Find(request.previous->object, "previous.object"));
+    TouchRequest alone;
+    alone.touches = {request.previous->touch};
+    TOUCHSTONE_RETURN_IF_ERROR(FillBlock(alone, *before, 0, 1, simulator, &batch));
+    TOUCHSTONE_RETURN_IF_ERROR(simulator.RunToMotion(&batch, &workspace));
+    press_m = batch.press_m;
+  }
   for (size_t begin = 0; begin < request.touches.size();) {
     TOUCHSTONE_RETURN_IF_ERROR(guard());
     const int count = static_cast<int>(BlockSize(request.touches, begin));

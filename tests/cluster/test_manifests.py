@@ -74,7 +74,7 @@ def test_selectors_find_the_pods_of_the_deployment(overlay):
 
 
 def test_exit_codes_are_those_of_the_command_line():
-    header = (REPOSITORY / "client/cli/exit_code.h").read_text()
+    header = (REPOSITORY / "client/cli/common/exit_code.h").read_text()
     codes = {name: int(code) for name, code in re.findall(r"k(\w+) = (\d+)", header)}
     rules = of_kind(built("bulk"), "Job")["spec"]["podFailurePolicy"]["rules"]
     (failing,) = [rule for rule in rules if rule["action"] == "FailIndex"]

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "server/service/gateway_server.h"
+#include "server/service/gateway/gateway_server.h"
 #include "tests/conformance/conformance.h"
 #include "tests/rig/emulator.h"
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "server/service/server.h"
+#include "server/service/rpc/server.h"
 #include "tests/conformance/conformance.h"
 
 int main(int argc, char** argv) {

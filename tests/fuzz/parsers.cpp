@@ -15,7 +15,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
 #include "server/model/surface_map_file.h"
-#include "server/service/option_table.h"
+#include "server/service/options/option_table.h"
 #include "server/session/camera_yaml.h"
 #include "server/session/images_csv.h"
 #include "server/session/journal.h"

@@ -6,7 +6,7 @@
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
-#include "server/service/convert.h"
+#include "server/service/core/convert.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 

@@ -3,8 +3,8 @@
 
 #include <fstream>
 
-#include "server/service/access.h"
-#include "server/service/test_call.h"
+#include "server/service/core/access.h"
+#include "server/service/tests/test_call.h"
 #include "tests/physical/physical_test.h"
 
 namespace touchstone {

@@ -6,7 +6,7 @@
 
 #include "server/base/full_disk.h"
 #include "server/base/units.h"
-#include "server/service/stored_session.h"
+#include "server/service/sessions/stored_session.h"
 #include "server/session/emulated.h"
 #include "server/session/image_set_file.h"
 #include "tests/physical/physical_test.h"

@@ -15,7 +15,7 @@
 
 #include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
-#include "server/service/gateway_server.h"
+#include "server/service/gateway/gateway_server.h"
 #include "server/session/journal.h"
 #include "tests/rig/emulator.h"
 #include "touchstone/v1/control.grpc.pb.h"

@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/base/stop_signals.h"
-#include "server/service/man_page.h"
+#include "server/service/options/man_page.h"
 #include "tests/rig/emulator.h"
 #include "tests/rig/emulator_commands.h"
 #include "tests/rig/emulator_files.h"

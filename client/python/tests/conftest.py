@@ -102,6 +102,21 @@ def client(server):
         yield connected
 
 
+@pytest.fixture(scope="session")
+def two_rounds(tmp_path_factory):
+    """A function that measures 24 poses of lat20 in two rounds with a rig of that model; it returns the file."""
+
+    def measure(client, model):
+        touches = client.plan(touchstone.faces(samples_per_face=4, rounds=2), "lat20", count=48)
+        batch = client.touch("lat20", touches, model=model, seed=1)
+        path = tmp_path_factory.mktemp("two_rounds") / "set.csv"
+        touchstone.write_measurements(path, [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(batch["contact_time_us"][k]))
+                                             for k in range(len(touches))])
+        return path
+
+    return measure
+
+
 @pytest.fixture
 def nobody():
     """An address of this machine at which nobody listens, for as long as the test runs."""

@@ -112,7 +112,7 @@ def run(*words):
     return done.returncode, " ".join((done.stdout + done.stderr).split())
 
 
-# server/service/host_port_test.cpp has the same lists.
+# server/service/channel/host_port_test.cpp has the same lists.
 @pytest.mark.parametrize("target", ["127.0.0.1:1", "127.1.2.3:1", "localhost:0", "LocalHost:1", "[::1]:1",
                                     "[::ffff:127.0.0.1]:1", "unix:/run/t", "unix-abstract:t", "dns:localhost:1",
                                     "dns:///127.0.0.1:1", "ipv4:127.0.0.1:1,127.0.0.2:1", "ipv6:[::1]:1"])

@@ -15,14 +15,9 @@ def client(server):
 
 
 @pytest.fixture(scope="module")
-def measured(client, tmp_path_factory):
-    """24 poses of lat20 in two rounds, by a rig that is too fast."""
-    touches = client.plan(touchstone.faces(samples_per_face=4, rounds=2), "lat20", count=48)
-    batch = client.touch("lat20", touches, model=HIDDEN, seed=1)
-    path = tmp_path_factory.mktemp("questions") / "set.csv"
-    touchstone.write_measurements(path, [touchstone.Row(k, "lat20", touches[k:k + 1], tuple(batch["contact_time_us"][k]))
-                                         for k in range(len(touches))])
-    return path
+def measured(client, two_rounds):
+    """By a rig that is too fast."""
+    return two_rounds(client, HIDDEN)
 
 
 def test_a_check_says_from_which_size_each_effect_is_found(client, measured):

@@ -1,6 +1,6 @@
 """Where every connection of this package begins: whether it may go through a proxy is decided here.
 
-Its twin is server/service/channel.h.
+Its twin is server/service/channel/channel.h.
 """
 
 from __future__ import annotations

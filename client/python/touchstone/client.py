@@ -239,7 +239,7 @@ class Client(Diagnosis):
 
     def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
               lease_token: str = "", session: str = "", ids: Sequence[str] | None = None,
-              series: bool = False) -> Batch:
+              series: bool = False, previous: tuple[str, Touches] | None = None) -> Batch:
         """Touches in the order given, as one session. NaN where a finger reported nothing.
 
         Args:
@@ -251,6 +251,8 @@ class Client(Diagnosis):
             that the call is repeated when the source was lost; without ids it is not.
           series: a physical source also keeps and gives the arm's states during each approach (`measured[k].series`,
             touchstone.v1.TouchSeries), about 200 kB a touch.
+          previous: (object, touches): the last of these was made before, in the same session. What it leaves in the fingers of
+            a virtual source (return_hysteresis), and the pause since, act on the first touch.
 
         Returns:
           A batch with (N, fingers) `descriptor_us`, `contact_time_us` and, where the source knows it, `travel_mm`;
@@ -267,6 +269,9 @@ class Client(Diagnosis):
             first_index=checks.uint64("start", start), lease_token=lease_token, session=session, touch_ids=ids or (),
             series=series,
         )
+        if previous is not None:
+            request.previous.object = previous[0]
+            request.previous.touch.CopyFrom(previous[1][-1:].to_messages()[0])
         with contextlib.nullcontext() if lease_token else self._leased() as lease:
             reply = self._touch(request, lease)
         for note in reply.notes:

@@ -1,4 +1,4 @@
-"""How far a command is, as the other commands show it (client/cli/progress_bar.h): on a terminal one line in place, elsewhere a
+"""How far a command is, as the other commands show it (client/cli/common/progress_bar.h): on a terminal one line in place, elsewhere a
 line every ten seconds, and nothing of what is done at once."""
 
 from __future__ import annotations

@@ -8,7 +8,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/selection/candidates.h"
-#include "server/diagnosis/selection/declared_noise.h"
+#include "server/diagnosis/selection/scatter/declared_noise.h"
 
 namespace touchstone::diagnosis::design {
 namespace {

@@ -1,5 +1,5 @@
 // A formula or a curve for what no effect of the catalogue explains in photographs: a suggestion, held to the same rules
-// as for touches (selection/formula_terms.h, nameless_curve.h).
+// as for touches (selection/curves/formula_terms.h, nameless_curve.h).
 #pragma once
 
 #include <optional>

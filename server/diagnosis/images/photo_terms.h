@@ -1,5 +1,5 @@
 // A dictionary of simple terms that grey levels may follow when no effect of the catalogue does: functions of what
-// formulas may read of a pixel, as people would write them in a model file; selection/formula_terms.h for photographs.
+// formulas may read of a pixel, as people would write them in a model file; selection/curves/formula_terms.h for photographs.
 #pragma once
 
 #include <functional>

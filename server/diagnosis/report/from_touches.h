@@ -5,7 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/report/diagnosis.h"
-#include "server/diagnosis/selection/ladder.h"
+#include "server/diagnosis/selection/ladder/ladder.h"
 
 namespace touchstone::diagnosis::report {
 

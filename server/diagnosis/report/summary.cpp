@@ -10,7 +10,7 @@
 #include "server/base/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/distributions_summary.h"
-#include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
 #include "server/session/emulated.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/lookup.h"
 
 namespace touchstone::diagnosis::selection {

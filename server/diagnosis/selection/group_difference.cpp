@@ -14,10 +14,10 @@
 #include "server/base/readable_time.h"
 #include "server/base/status.h"
 #include "server/diagnosis/selection/quality.h"
-#include "server/diagnosis/selection/repeats.h"
-#include "server/diagnosis/selection/round_structure.h"
-#include "server/diagnosis/selection/session_parts.h"
-#include "server/diagnosis/selection/time_structure.h"
+#include "server/diagnosis/selection/session/repeats.h"
+#include "server/diagnosis/selection/session/round_structure.h"
+#include "server/diagnosis/selection/session/session_parts.h"
+#include "server/diagnosis/selection/session/time_structure.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

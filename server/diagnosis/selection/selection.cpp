@@ -9,9 +9,9 @@
 #include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
-#include "server/diagnosis/selection/declared_noise.h"
 #include "server/diagnosis/selection/effect_columns.h"
 #include "server/diagnosis/selection/group_difference.h"
+#include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise_sample.h"
@@ -165,9 +165,8 @@ absl::StatusOr<touches::NoiseFindings> NoiseOf(const Workspace& workspace, const
   touches::DeclaredNoise declared = DeclaredNoiseOf(*workspace.input.model);
   // Tails may stand for the outliers that were left out.
   if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
-  return touches::FindNoise(touches::MakeNoiseSample(o, residuals, touches::TangentsOfIncidence(details),
-                                                     touches::ExpectedReadings(o, details)),
-                            fit.model.size() + surface_dof, declared);
+  return touches::FindNoise(touches::MakeNoiseSample(o, residuals, details), fit.model.size() + surface_dof,
+                            declared);
 }
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or

@@ -12,10 +12,10 @@
 
 #include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/engine/nothing_missing.h"
-#include "server/diagnosis/selection/formula_terms.h"
-#include "server/diagnosis/selection/nameless_curve.h"
-#include "server/diagnosis/selection/noise_memory.h"
-#include "server/diagnosis/selection/partial_offset.h"
+#include "server/diagnosis/selection/curves/formula_terms.h"
+#include "server/diagnosis/selection/curves/nameless_curve.h"
+#include "server/diagnosis/selection/scatter/noise_memory.h"
+#include "server/diagnosis/selection/session/partial_offset.h"
 #include "server/diagnosis/selection/workspace.h"
 #include "server/diagnosis/touches/noise_kinds.h"
 

@@ -7,7 +7,7 @@
 
 #include "server/base/random.h"
 #include "server/base/status.h"
-#include "server/diagnosis/selection/nameless_curve.h"
+#include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/noise_sample.h"
 #include "server/diagnosis/touches/ticks.h"

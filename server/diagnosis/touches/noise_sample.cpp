@@ -134,4 +134,10 @@ NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<
   return sample;
 }
 
+NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
+                            const Prediction& prediction) {
+  return MakeNoiseSample(observations, residuals_s, TangentsOfIncidence(prediction),
+                         ExpectedReadings(observations, prediction));
+}
+
 }  // namespace touchstone::diagnosis::touches

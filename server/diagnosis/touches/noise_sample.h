@@ -21,5 +21,8 @@ std::vector<double> TangentsOfIncidence(const Prediction& prediction);
 // used count. Groups carry the touch as their index.
 NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
                             const std::vector<double>& tan_incidence, const std::vector<char>& expected);
+// The same of residuals of one model, `prediction` with its details.
+NoiseSample MakeNoiseSample(const Observations& observations, const std::vector<double>& residuals_s,
+                            const Prediction& prediction);
 
 }  // namespace touchstone::diagnosis::touches

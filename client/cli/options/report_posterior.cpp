@@ -1,0 +1,67 @@
+#include "client/cli/options/report_posterior.h"
+
+#include <absl/strings/str_cat.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/base/status.h"
+#include "server/base/text.h"
+
+namespace touchstone::cli {
+namespace {
+
+using ReportJson = nlohmann::json;
+
+constexpr char kExpected[] = "a report of `touchstone diagnose SET --json FILE` was expected";
+
+// Why a report has no posterior.
+std::string WhyNone(const ReportJson& report) {
+  const std::string verdict = report.value("verdict", "VERDICT_UNSPECIFIED");
+  const ReportJson data = report.value("data", ReportJson::array());
+  const auto kind = [&](size_t i) { return data[i].value("kind", ""); };
+  if (verdict == "CHECK_DATA")
+    return "the set has a mistake (CHECK_DATA), and no model is claimed beside it: fix it first";
+  if (verdict == "TOO_LITTLE_DATA") return "the set has too few measurements for a verdict (TOO_LITTLE_DATA)";
+  if (data.size() == 2 && kind(0) != kind(1))
+    return "it is one of touches and photographs together, whose values have no joint uncertainty yet: "
+           "diagnose the touches alone";
+  if (data.size() == 1 && kind(0) == "PHOTOGRAPHS")
+    return "it is one of photographs, and only a model of touches has one";
+  if (data.size() == 1 && kind(0) == "BOARDS")
+    return "it is one of chessboards, and only a model of touches has one";
+  if (data.size() == 1 && kind(0) == "DISTRIBUTIONS")
+    return "its touches have no poses, so that no value of a model was fitted";
+  if (verdict == "VERDICT_UNSPECIFIED") return "it has no verdict, as of `touchstone compare`";
+  if (data.size() > 1)
+    return "the last of its sessions does not agree with what all of them say, or takes no part in it";
+  return "it was written by a version that did not keep it: diagnose the set again";
+}
+
+}  // namespace
+
+absl::StatusOr<ReportedPosterior> PosteriorOfReport(const std::string& path) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  const ReportJson report = ReportJson::parse(text, nullptr, false);
+  if (report.is_discarded() || !report.is_object())
+    return absl::InvalidArgumentError(absl::StrCat(path, ": is no JSON object; ", kExpected));
+  if (!report.contains("posterior")) {
+    if (!report.contains("data") || !report["data"].is_array())
+      return absl::InvalidArgumentError(absl::StrCat(path, ": is no report; ", kExpected));
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": the report says nothing of how sure its model is: ", WhyNone(report)));
+  }
+  ReportedPosterior found;
+  const auto status =
+      google::protobuf::util::JsonStringToMessage(report["posterior"].dump(), &found.posterior);
+  if (!status.ok())
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": 'posterior' cannot be read: ", std::string(status.message())));
+  if (report.value("verdict", "") == "UNEXPLAINED")
+    found.note = absl::StrCat("note: ", path,
+                              " says UNEXPLAINED: something is left that the model does not have, and its "
+                              "predictions err by more than these uncertainties say");
+  return found;
+}
+
+}  // namespace touchstone::cli

@@ -1,0 +1,52 @@
+// Sessions of a journal file (.db) on this computer, for the commands that take one in place of a server's.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <absl/status/statusor.h>
+
+#include "client/cli/common/common.h"
+#include "client/source/measurement_csv.h"
+#include "server/session/journal.h"
+#include "server/session/measurement_set.h"
+#include "touchstone/v1/diagnosis.pb.h"
+
+namespace touchstone::cli {
+
+// Whether the user means a journal: the name ends in .db.
+bool IsJournalPath(const std::string& text);
+
+absl::StatusOr<std::unique_ptr<session::Journal>> OpenJournal(const std::string& path);  // to read
+
+// The session of that name; with an empty name the only one. Errors list what there is.
+absl::StatusOr<session::JournalSession> FindSession(const session::Journal& journal, const std::string& path,
+                                                    const std::string& name);
+
+// Its touches that are done, in the order in which they were made.
+absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,
+                                                             const std::string& session);
+
+// What the journal's only session measured; `path` is its origin.
+absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path);
+// The photographs of the journal's only session, where it has no touch that is done; else none, and --quiet apart it is
+// said that they are left out.
+absl::StatusOr<std::optional<v1::ImageSetFiles>> JournalPhotographs(const Cli& cli, const std::string& path);
+// The measurement file of a session.
+absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session);
+
+// Writes it to a file (.csv, .h5), to the folder of an image set where it has photographs, or to stdout (empty, "-": CSV);
+// an existing file with --force only. Touches that are damaged are left out where `skip_damaged` is given, which is told
+// each.
+absl::Status ExportFromJournal(const Cli& cli, const std::string& path, const std::string& session,
+                               const std::string& output,
+                               session::Journal::SkipDamaged skip_damaged = nullptr);
+
+// Makes a session out of a measurement file (.csv) or of what was exported (.h5), in a journal that may have
+// others. Returns its number of touches.
+absl::StatusOr<size_t> ImportIntoJournal(const std::string& file_path, const std::string& journal_path,
+                                         const std::string& session);
+
+}  // namespace touchstone::cli

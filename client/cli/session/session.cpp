@@ -1,0 +1,416 @@
+// touchstone session create|list|show|export|import|fix|delete|restore: measured sets that a server keeps, or that
+// a journal holds.
+#include <absl/strings/str_join.h>
+
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+
+#include "client/cli/common/common.h"
+#include "client/cli/common/interrupt.h"
+#include "client/cli/common/output_file.h"
+#include "client/cli/session/fix.h"
+#include "client/cli/session/images.h"
+#include "client/cli/session/journal_session.h"
+#include "client/cli/session/trash.h"
+#include "client/cli/session/verify.h"
+#include "client/source/touch_ids.h"
+#include "server/base/status.h"
+#include "server/base/text.h"
+#include "server/base/units.h"
+#include "server/session/image_set_file.h"
+#include "server/session/image_set_hdf5.h"
+
+namespace touchstone::cli {
+namespace {
+
+struct SessionOptions {
+  std::string name, file, output;
+  std::string in_journal;  // the session's name where NAME is a journal
+  bool check = false;
+  bool deleted = false, skip_damaged = false;
+};
+
+absl::StatusOr<std::unique_ptr<client::Connection>> ConnectToServer(const Cli& cli) {
+  if (cli.source().servers.empty())
+    return absl::InvalidArgumentError(
+        "--server is missing: sessions are kept by a touchstone-server, for instance --server "
+        "127.0.0.1:50051, or by a journal, for instance session.db");
+  return cli.Connect();
+}
+
+Json SessionJson(const v1::Session& session) {
+  return {{"name", session.name()},
+          {"hash", session.hash()},
+          {"bytes", session.bytes()},
+          {"touches", session.touches()},
+          {"fingers", session.fingers()},
+          {"objects", std::vector<std::string>(session.objects().begin(), session.objects().end())},
+          {"has_poses", session.has_poses()},
+          {"images", session.images()}};
+}
+
+std::string InWords(const v1::Session& session) {
+  std::vector<std::string> parts;
+  if (session.touches() > 0 || session.images() == 0) {
+    parts.push_back(Counted(session.touches(), "touch", "touches"));
+    parts.push_back(Counted(session.fingers(), "finger", "fingers"));
+    if (!session.has_poses()) parts.push_back("no poses");
+  }
+  if (session.images() > 0) parts.push_back(Counted(session.images(), "photograph", "photographs"));
+  parts.push_back(absl::StrCat("hash ", session.hash().substr(0, 12)));
+  return absl::StrJoin(parts, ", ");
+}
+
+// --- Sessions of a journal file
+
+Json JournalSessionJson(const session::JournalSession& session) {
+  return {{"name", session.name},
+          {"source", session.provenance},
+          {"created_unix_s", session.created_unix_s},
+          {"fingers", session.fingers},
+          {"spacing_mm", session.spacing_m * kMillimetresPerMetre},
+          {"touches", session.touches},
+          {"done", session.done},
+          {"failed", session.failed},
+          {"images", session.images},
+          {"deleted_unix_s", session.deleted_unix_s},
+          {"deleted_by", session.deleted_by},
+          {"objects", session.objects}};
+}
+
+std::string UtcText(double unix_s) {
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm parts{};
+  char text[32] = "";
+  if (::gmtime_r(&seconds, &parts) != nullptr)
+    std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+std::string DeletedText(double unix_s, const std::string& by) {
+  return absl::StrCat(UtcText(unix_s), by.empty() ? "" : " by ", by);
+}
+
+// What is read without checksums cannot be told from what has changed on the disk.
+void SayIfUnchecked(const Cli& cli, const session::Journal& journal, const std::string& path) {
+  if (!journal.has_checksums())
+    cli.Log(absl::StrCat(path,
+                         " is of version 1, whose rows have no checksums: damage to its numbers would not be "
+                         "noticed (opened for writing, it gets them)"));
+}
+
+absl::Status ListJournal(const Cli& cli, const std::string& path, bool deleted) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
+  SayIfUnchecked(cli, *journal, path);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions,
+                              deleted ? journal->DeletedSessions() : journal->Sessions());
+  if (cli.output().json) {
+    Json list = Json::array();
+    for (const session::JournalSession& session : sessions) list.push_back(JournalSessionJson(session));
+    PrintJson({{"sessions", list}});
+    return absl::OkStatus();
+  }
+  Table table({"SESSION", "TOUCHES", "DONE", "PICTURES", deleted ? "DELETED" : "CREATED", "OBJECTS"});
+  for (const session::JournalSession& session : sessions)
+    table.Add(
+        {session.name, std::to_string(session.touches), std::to_string(session.done),
+         std::to_string(session.images),
+         deleted ? DeletedText(session.deleted_unix_s, session.deleted_by) : UtcText(session.created_unix_s),
+         absl::StrJoin(session.objects, ", ")});
+  return cli.Print(table.Text());
+}
+
+absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
+  SayIfUnchecked(cli, *journal, options.name);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
+                              FindSession(*journal, options.name, options.in_journal));
+  if (cli.output().json) {
+    PrintJson(JournalSessionJson(session));
+    return absl::OkStatus();
+  }
+  return cli.Print(absl::StrCat(
+      session.name, ": ", Counted(session.touches, "touch", "touches"), ", ", session.done, " done, ",
+      session.failed, " failed, ", Counted(session.images, "picture", "pictures"), ", ",
+      Counted(session.fingers, "finger", "fingers"), "\n  Objects   ", absl::StrJoin(session.objects, ", "),
+      "\n  Source    ", session.provenance, "\n  Created   ", UtcText(session.created_unix_s), "\n"));
+}
+
+// --- Sessions of a server
+
+absl::Status RunCreate(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Session session,
+                              SendSession(connection.get(), options.file, options.name, options.check));
+  if (cli.output().json)
+    PrintJson(SessionJson(session));
+  else
+    cli.Log(absl::StrCat(options.check ? "can be stored as " : "stored as ", options.name, ": ",
+                         InWords(session)));
+  return absl::OkStatus();
+}
+
+// A journal keeps what a rig saw, in the rig's frame and as its camera gave it; photographs with poses in an object's
+// frame are kept by a server.
+absl::Status ImportToServer(const Cli& cli, const SessionOptions& options) {
+  SessionOptions create = options;
+  if (create.name.empty())
+    create.name = client::SessionNameOf(std::filesystem::path(options.file + "/").parent_path().string());
+  TOUCHSTONE_RETURN_IF_ERROR(client::CheckSessionName(create.name, "--session"));
+  return RunCreate(cli, create);
+}
+
+absl::Status RunImport(const Cli& cli, const SessionOptions& options) {
+  std::error_code error;
+  const bool folder = std::filesystem::is_directory(options.file, error);
+  const bool image_set_file = !folder && IsHdf5Path(options.file) && session::IsImageSetHdf5(options.file);
+  if (image_set_file && !options.output.empty() && !IsJournalPath(options.output)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadImageSession(options.file));
+    return WriteExportedSession(cli, options.file, session, options.output);
+  }
+  if (options.output.empty() && (folder || !cli.source().servers.empty()))
+    return ImportToServer(cli, options);
+  if (folder || image_set_file)
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: ", options.file,
+                     " is an image set, whose poses are in the object's frame; a journal keeps them "
+                     "in a rig's. A server keeps it: touchstone session import ",
+                     options.file, " --server 127.0.0.1:50051"));
+  if (options.output.empty())
+    return absl::InvalidArgumentError(
+        "say where to: -o SESSION.db puts the touches into a journal, --server ADDRESS has a server keep "
+        "them");
+  if (!IsJournalPath(options.output))
+    return absl::InvalidArgumentError(
+        absl::StrCat("-o: '", options.output, "' is no journal; its name ends in .db"));
+  const std::string name = options.name.empty() ? client::SessionNameOf(options.file) : options.name;
+  TOUCHSTONE_RETURN_IF_ERROR(client::CheckSessionName(name, "--session"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const size_t touches, ImportIntoJournal(options.file, options.output, name));
+  if (cli.output().json) PrintJson({{"session", name}, {"journal", options.output}, {"touches", touches}});
+  cli.Log(absl::StrCat(options.output, ": session '", name, "', ", Counted(touches, "touch", "touches")));
+  return absl::OkStatus();
+}
+
+// All of them, however many pages they take.
+absl::StatusOr<std::vector<v1::Session>> ListSessions(client::Connection* connection, bool deleted) {
+  std::vector<v1::Session> sessions;
+  v1::ListSessionsRequest request;
+  request.set_deleted(deleted);
+  do {
+    TOUCHSTONE_ASSIGN_OR_RETURN(v1::ListSessionsResponse page,
+                                connection->Call(&v1::Sessions::Stub::ListSessions, request));
+    for (v1::Session& session : *page.mutable_sessions()) sessions.push_back(std::move(session));
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return sessions;
+}
+
+absl::Status RunList(const Cli& cli, const SessionOptions& options) {
+  if (!options.file.empty()) {
+    if (IsJournalPath(options.file)) return ListJournal(cli, options.file, options.deleted);
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", options.file, "' is no journal; its name ends in .db"));
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<v1::Session> sessions,
+                              ListSessions(connection.get(), options.deleted));
+  if (cli.output().json) {
+    Json list = Json::array();
+    for (const v1::Session& session : sessions) list.push_back(SessionJson(session));
+    PrintJson({{"sessions", list}});
+    return absl::OkStatus();
+  }
+  if (sessions.empty()) {
+    cli.Log(options.deleted
+                ? "Nothing is in the trash; what a server deletes is gone, rigs and journals have one."
+                : "The server keeps no session; touchstone session create NAME FILE stores one.");
+    return absl::OkStatus();
+  }
+  if (options.deleted) {
+    Table table({"SESSION", "TOUCHES", "DELETED", "OBJECTS"});
+    for (const v1::Session& session : sessions)
+      table.Add({session.name(), std::to_string(session.touches()),
+                 DeletedText(session.deleted_unix_s(), session.deleted_by()),
+                 absl::StrJoin(session.objects(), ", ")});
+    return cli.Print(table.Text());
+  }
+  Table table({"SESSION", "TOUCHES", "FINGERS", "POSES", "PICTURES", "HASH", "OBJECTS"});
+  for (const v1::Session& session : sessions)
+    table.Add({session.name(), std::to_string(session.touches()), std::to_string(session.fingers()),
+               session.has_poses() ? "yes" : "no", std::to_string(session.images()),
+               session.hash().empty() ? "-" : session.hash().substr(0, 12),
+               absl::StrJoin(session.objects(), ", ")});
+  return cli.Print(table.Text());
+}
+
+absl::Status RunShow(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options.name, options.in_journal));
+  if (IsJournalPath(options.name)) return ShowJournal(cli, options);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  v1::GetSessionRequest request;
+  request.set_name(options.name);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Session session,
+                              connection->Call(&v1::Sessions::Stub::GetSession, request));
+  if (cli.output().json) {
+    PrintJson(SessionJson(session));
+    return absl::OkStatus();
+  }
+  return cli.Print(absl::StrCat(session.name(), ": ", InWords(session), "\n  Objects   ",
+                                absl::StrJoin(session.objects(), ", "), "\n  Size      ", session.bytes(),
+                                " bytes\n"));
+}
+
+absl::Status ExportJournal(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
+  SayIfUnchecked(cli, *journal, options.name);
+  size_t damaged = 0;
+  session::Journal::SkipDamaged skip;
+  if (options.skip_damaged)
+    skip = [&](const absl::Status& damage) {
+      ++damaged;
+      cli.Log(absl::StrCat("left out: ", damage.message()));
+    };
+  TOUCHSTONE_RETURN_IF_ERROR(
+      ExportFromJournal(cli, options.name, options.in_journal, options.output, std::move(skip)));
+  if (options.skip_damaged)
+    cli.Log(damaged == 0 ? "nothing was damaged"
+                         : "what was damaged is not in this export: see the lines above");
+  return absl::OkStatus();
+}
+
+absl::Status RunExport(const Cli& cli, const SessionOptions& options) {
+  TOUCHSTONE_RETURN_IF_ERROR(CheckInJournal(options.name, options.in_journal));
+  if (IsJournalPath(options.name)) return ExportJournal(cli, options);
+  // A folder of photographs as one file; nothing else is a name with a slash or a folder's.
+  if (session::IsImageSetFolder(options.name) && IsHdf5Path(options.output)) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session, ReadImageSession(options.name));
+    return WriteExportedSession(cli, options.name, session, options.output);
+  }
+  if (options.skip_damaged)
+    return absl::InvalidArgumentError(
+        "--skip-damaged is for a journal (.db): copy the rig's with sqlite3 rig.db '.backup copy.db', and "
+        "export that");
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto connection, ConnectToServer(cli));
+  std::string left_out;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession session,
+                              FetchSession(connection.get(), options.name, &left_out));
+  if (!left_out.empty()) cli.Log(left_out);
+  return WriteExportedSession(cli, options.name, session, options.output);
+}
+
+}  // namespace
+
+void AddSession(Cli* cli) {
+  auto options = std::make_shared<SessionOptions>();
+  CLI::App* group = cli->AddGroup(
+      "session",
+      "Measured sets: at a server, where its replicas and other people find them, or in a rig's journal.",
+      "touchstone session create monday set.csv --server 127.0.0.1:50051\n"
+      "touchstone session list --server 127.0.0.1:50051\n"
+      "touchstone diagnose monday --model nominal.yaml --server 127.0.0.1:50051\n"
+      "touchstone session export monday -o set.csv --server 127.0.0.1:50051\n"
+      "touchstone session list session.db                                        a journal of "
+      "touchstone rig run\n"
+      "touchstone session export session.db -o set.csv");
+  const auto add_name = [&](CLI::App* command) {
+    command->add_option("NAME", options->name, "The session's name: letters, digits, '_', '-' and '.'")
+        ->type_name("")
+        ->required();
+  };
+  const auto add_place = [&](CLI::App* command) {
+    cli->AddInput(command, command
+                               ->add_option("NAME", options->name,
+                                            "The name of a server's session, a journal (.db), or for export "
+                                            "to .h5 the folder of an image set")
+                               ->type_name("")
+                               ->required());
+    command
+        ->add_option("SESSION", options->in_journal,
+                     "The session's name in that journal. Default: its only one")
+        ->type_name("");
+  };
+  const std::string server = " --server 127.0.0.1:50051";
+
+  CLI::App* create = cli->AddCommand(
+      group, "create",
+      "Checks a measurement file, or a folder of photographs (images.csv, "
+      "camera.yaml, pictures, and touches.csv if there is one), and stores it. A session never "
+      "changes.",
+      "touchstone session create monday set.csv" + server + "\n" +
+          "touchstone session create pictures photos" + server + "\n" +
+          "touchstone session create monday set.csv --check" + server,
+      [cli, options] { return RunCreate(*cli, *options); });
+  add_name(create);
+  create->add_option("FILE", options->file, "The measurement file (CSV), or the folder")
+      ->type_name("")
+      ->required();
+  create->add_flag("--check", options->check, "Only check it");
+  cli->AddSourceOptions(create);
+
+  CLI::App* list =
+      cli->AddCommand(group, "list", "Lists the stored sessions.",
+                      "touchstone session list" + server + "\ntouchstone session list session.db\n" +
+                          "touchstone session list session.db --deleted",
+                      [cli, options] { return RunList(*cli, *options); });
+  list->add_option("JOURNAL", options->file, "A journal (.db). Default: those of --server")->type_name("");
+  list->add_flag("--deleted", options->deleted, "Those in the trash of a rig or of a journal");
+  cli->AddSourceOptions(list);
+
+  CLI::App* show = cli->AddCommand(
+      group, "show", "Describes a session.",
+      "touchstone session show monday" + server + "\ntouchstone session show session.db monday",
+      [cli, options] { return RunShow(*cli, *options); });
+  add_place(show);
+  cli->AddSourceOptions(show);
+
+  CLI::App* out = cli->AddCommand(group, "export",
+                                  "Writes a session's measurement file, or the folder of its photographs, as "
+                                  "it was stored.",
+                                  "touchstone session export monday -o set.csv" + server + "\n" +
+                                      "touchstone session export pictures -o photos" + server + "\n" +
+                                      "touchstone session export session.db -o set.csv\n"
+                                      "touchstone session export session.db monday -o set.h5\n"
+                                      "touchstone session export session.db -o photos\n"
+                                      "touchstone session export photos -o photos.h5",
+                                  [cli, options] { return RunExport(*cli, *options); });
+  add_place(out);
+  cli->AddOutput(out, "-o,--output", &options->output,
+                 "The file to write, or the folder for photographs; .h5: photographs with poses and lens as "
+                 "one file, or all "
+                 "that a journal has. Default: stdout");
+  out->add_flag(
+      "--skip-damaged", options->skip_damaged,
+      "Leave out touches and pictures of a journal that differ from their checksums, naming each; else one "
+      "of them is an error");
+  cli->AddSourceOptions(out);
+
+  CLI::App* in =
+      cli->AddCommand(group, "import",
+                      "Puts a measurement file into a journal, or has a server keep it or a folder "
+                      "of photographs (with its touches.csv, if there is one).",
+                      "touchstone session import set.csv -o session.db\n"
+                      "touchstone session import photos" +
+                          server + "\n" + "touchstone session import set.csv -o session.db --session monday",
+                      [cli, options] { return RunImport(*cli, *options); });
+  cli->AddInput(in,
+                in->add_option("FILE", options->file,
+                               "The measurement file (.csv), what session export wrote (.h5), or the folder "
+                               "of an image set; of one as .h5, -o FOLDER makes the folder again")
+                    ->type_name("")
+                    ->required());
+  cli->AddOutput(in, "-o,--output", &options->output,
+                 "The journal (.db); made if it is not there, else the session is added to what it has",
+                 OutputKind::kJournal);
+  cli->AddSourceOptions(in);
+  in->add_option("--session", options->name, "The session's name. Default: the file's without its ending")
+      ->type_name("NAME");
+
+  AddSessionVerify(cli, group);
+
+  AddSessionFix(cli, group);
+
+  AddSessionTrash(cli, group);
+}
+
+}  // namespace touchstone::cli

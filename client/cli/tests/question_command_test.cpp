@@ -1,0 +1,143 @@
+// check, explain and compare with two models as people and scripts meet them: the real binary.
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/tests/real_binary_test.h"
+#include "client/source/measurement_csv.h"
+
+namespace touchstone::cli {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+constexpr char kModelFile[] =
+    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
+
+// A plan of 24 poses in two rounds on lat20, and what a rig with balls for tips measured of it: plan.csv, set.csv.
+class QuestionCommandTest : public RealBinaryTest {
+ protected:
+  void MakePlan() {
+    Write("nominal.yaml", kModelFile);
+    Write("tips.yaml", std::string(kModelFile) + "  - tip_radius: {radius_mm: 3}\n");
+    ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2", "-o",
+                   "plan.csv"})
+                  .exit_code,
+              0);
+  }
+  void MakeSet() {
+    MakePlan();
+    ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "--model", "tips.yaml", "-o", "set.csv"}).exit_code, 0);
+  }
+};
+
+TEST_F(QuestionCommandTest, ACheckListsEveryEffectWithItsSize) {
+  MakePlan();
+  const Outcome outcome = Run({"check", "plan.csv", "--model", "nominal.yaml"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("48 touches on one object, noise 5.00 ms"), HasSubstr("tip_radius"),
+                    HasSubstr("never: acts as clock_skew"), HasSubstr("found from")));
+}
+
+TEST_F(QuestionCommandTest, ACheckIsTheSameWhateverTheTimesOfTheSet) {
+  MakeSet();
+  const auto detectable = [&](const char* file) {
+    return Json::parse(Run({"check", file, "--model", "nominal.yaml", "--json", "-"}).out)["detectable"];
+  };
+  EXPECT_EQ(detectable("plan.csv"), detectable("set.csv"));
+}
+
+TEST_F(QuestionCommandTest, ProposedTouchesAreAPlanThatCanBeTouched) {
+  MakePlan();
+  const Outcome outcome = Run({"check", "plan.csv", "--model", "nominal.yaml", "--improve", "6", "--between",
+                               "finger_length,channel_latency", "-o", "more.csv"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("6 touches: tells finger_length from channel_latency"));
+  EXPECT_EQ(Run({"touch", "--plan", "more.csv", "-o", "touched.csv"}).exit_code, 0);
+  EXPECT_THAT(*client::ParseMeasurements(Read("touched.csv"), "touched.csv"), SizeIs(6));
+}
+
+TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
+  MakePlan();
+  const auto message = [&](std::vector<std::string> arguments) {
+    std::vector<std::string> command = {"check", "plan.csv", "--model", "nominal.yaml"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const Outcome outcome = Run(command);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.err;
+  };
+  EXPECT_THAT(message({"--improve", "6", "--find", "tip_radius"}), HasSubstr("-o FILE was expected"));
+  EXPECT_THAT(message({"--improve", "6", "-o", "more.csv"}), HasSubstr("depends on the question"));
+  EXPECT_THAT(message({"--find", "tip_radius"}), HasSubstr("belong to --improve"));
+  EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}),
+              HasSubstr("'tip_radios'"));
+  EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise: -5; a positive number of us was expected"));
+  Write("silent.yaml", "touchstone: model/1\nname: silent\nend_effector: {fingers: 3, spacing_mm: 30}\n");
+  const Outcome silent = Run({"check", "plan.csv", "--model", "silent.yaml"});
+  EXPECT_THAT(silent.err, AllOf(HasSubstr("'silent' has no noise"), HasSubstr("--noise 5")));
+}
+
+TEST_F(QuestionCommandTest, APlanWithoutTimesIsRefusedWhereTimesAreRead) {
+  MakePlan();
+  EXPECT_THAT(Run({"explain", "tip_radius", "plan.csv", "--model", "nominal.yaml"}).err,
+              HasSubstr("it is a plan"));
+  EXPECT_THAT(Run({"compare", "plan.csv", "--model", "nominal.yaml"}).err, HasSubstr("it is a plan"));
+}
+
+TEST_F(QuestionCommandTest, AnExplanationNamesTheCauseInPlaceOfWhatWasAsked) {
+  MakeSet();
+  const Outcome outcome = Run({"explain", "object_scale", "set.csv", "--model", "nominal.yaml"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("tip_radius"), HasSubstr("Against it")));
+  const Json cause =
+      Json::parse(Run({"explain", "tip_radius", "set.csv", "--model", "nominal.yaml", "--json", "-"}).out);
+  EXPECT_NEAR(cause["explained"]["parameters"][0]["value"].get<double>(), 3, 0.3);
+}
+
+TEST_F(QuestionCommandTest, OfTwoModelsTheTruthErrsLess) {
+  MakeSet();
+  const Outcome outcome = Run({"compare", "set.csv", "--model", "nominal.yaml", "--model", "tips.yaml"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("Two models"), HasSubstr("Deciding")));
+  EXPECT_THAT(Run({"compare", "set.csv", "--model", "nominal.yaml"}).out, Not(HasSubstr("Two models")));
+  EXPECT_THAT(Run({"diagnose", "set.csv", "--model", "nominal.yaml", "--model", "tips.yaml"}).err,
+              HasSubstr("--model: given 2 times; once was expected"));
+}
+
+TEST_F(QuestionCommandTest, ARehearsalGoesOnWhereItWasStoppedAndEndsAlike) {
+  MakePlan();
+  const auto rehearse = [&](const char* sets, const char* state) {
+    return Run({"rehearse", "plan.csv", "--model", "nominal.yaml", "--effects", "tip_radius", "--pairs", "0",
+                "--sets", sets, "--state", state, "--json", "-"});
+  };
+  ASSERT_EQ(rehearse("2", "cut.jsonl").exit_code, 0);
+  // What a kill leaves: a line that ends in the middle.
+  Write("cut.jsonl", Read("cut.jsonl") + "{\"case\": \"outs");
+  const Outcome resumed = rehearse("4", "cut.jsonl"), whole = rehearse("4", "whole.jsonl");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(resumed.out, whole.out);
+  EXPECT_EQ(Read("cut.jsonl"), Read("whole.jsonl"));
+  const Json rows = Json::parse(whole.out);
+  EXPECT_EQ(rows[0]["hidden"], "nothing");
+  EXPECT_EQ(rows[1]["found"], 1);  // a tip of the usual size
+  EXPECT_EQ(rows.back()["sets"], 4);
+  Write("tips.csv", Read("plan.csv") + "48,lat20,20,60,0,0,0,0,0,-1,1,0,0,0\n");
+  EXPECT_THAT(Run({"rehearse", "tips.csv", "--model", "nominal.yaml", "--effects", "tip_radius", "--pairs",
+                   "0", "--sets", "4", "--state", "cut.jsonl"})
+                  .err,
+              HasSubstr("is of another plan"));
+  EXPECT_THAT(Run({"rehearse", "plan.csv", "--model", "nominal.yaml", "--size", "much"}).err,
+              HasSubstr("'found' was expected"));
+}
+
+}  // namespace
+}  // namespace touchstone::cli

@@ -1,0 +1,60 @@
+// touchstone session verify on journals; those of a server are in server_variable_test.cpp.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <nlohmann/json.hpp>
+
+#include "client/cli/tests/real_binary_test.h"
+
+namespace touchstone::cli {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class SessionVerifyTest : public RealBinaryTest {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(Run({"plan", "lat20", "--count", "4", "-o", "plan.csv"}).exit_code, 0);
+    ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "-o", "set.csv"}).exit_code, 0);
+    ASSERT_EQ(Run({"session", "import", "set.csv", "-o", "session.db"}).exit_code, 0);
+  }
+};
+
+TEST_F(SessionVerifyTest, AWholeJournalIsSaidToBe) {
+  const Outcome outcome = Run({"session", "verify", "session.db"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("session 'set' is whole: 4 touches, 0 pictures"));
+  const auto json = nlohmann::json::parse(Run({"session", "verify", "session.db", "set", "--json"}).out);
+  EXPECT_EQ(json["whole"], true);
+  EXPECT_EQ(json["touches"], 4);
+}
+
+TEST_F(SessionVerifyTest, AChangedTouchIsNamedAndTheOthersCounted) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(Path("session.db").c_str(), &database), SQLITE_OK);
+  char* error = nullptr;
+  ASSERT_EQ(
+      sqlite3_exec(
+          database,
+          "UPDATE touch_finger SET contact_time_s = contact_time_s + 1 WHERE touch_id = 2 AND finger = 0",
+          nullptr, nullptr, &error),
+      SQLITE_OK)
+      << error;
+  sqlite3_close(database);
+  const Outcome outcome = Run({"session", "verify", "session.db"});
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("is not whole: 3 touches"), HasSubstr("differs from its checksum"),
+                                 HasSubstr("touchstone recover session.db")));
+}
+
+TEST_F(SessionVerifyTest, WithoutAServerANameSaysWhatIsMissing) {
+  const Outcome outcome = Run({"session", "verify", "monday"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("'monday'"), HasSubstr("--server"), HasSubstr("touchstone verify")));
+}
+
+}  // namespace
+}  // namespace touchstone::cli

@@ -1,0 +1,148 @@
+#include "server/diagnosis/selection/ladder/climb.h"
+
+#include "server/base/status.h"
+#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/selection/scatter/declared_noise.h"
+#include "server/diagnosis/selection/session/dropouts.h"
+#include "server/diagnosis/selection/session/session_order.h"
+#include "server/diagnosis/selection/session/time_structure.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+// The steps by their effects' indices in the model without the formula.
+std::vector<engine::SelectedStep> StepsWithoutFormula(const SelectionResult& selection) {
+  std::vector<engine::SelectedStep> steps = selection.steps;
+  for (engine::SelectedStep& step : steps)
+    if (selection.formula >= 0 && step.effect > selection.formula) --step.effect;
+  return steps;
+}
+
+class Climber {
+ public:
+  Climber(const Workspace& workspace, const SelectionResult& selection)
+      : workspace_(workspace), selection_(selection), ladder_(climb_.ladder) {
+    climb_.searched = has_formula() ? &selection.without_formula : &selection.fit;
+    climb_.steps = StepsWithoutFormula(selection);
+  }
+
+  absl::StatusOr<Climb> Run() {
+    TOUCHSTONE_RETURN_IF_ERROR(Improve());
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        climb_.before, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
+    const int step = engine::StepWithoutGain(climb_.before, engine::QualitiesOf(ladder_.steps));
+    if (step >= 0) {
+      const int effect = climbed_[step];
+      climb_.without_gain = effect + (has_formula() && effect >= selection_.formula);
+    }
+    return std::move(climb_);
+  }
+
+ private:
+  bool has_formula() const { return selection_.formula >= 0; }
+
+  // The improved model: everything but the formula, fitted without it; its residuals, and the noise floor of the best model.
+  absl::Status Improve() {
+    const touches::Observations& o = *workspace_.observations;
+    TOUCHSTONE_ASSIGN_OR_RETURN(climb_.fit, FitAll(workspace_, *climb_.searched));
+    ladder_.improved = climb_.fit.model.base();
+    engine::RoundValues(climb_.fit, &ladder_.improved);
+    ladder_.changed = !climb_.steps.empty();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> superfluous, DescribeGiven());
+    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
+    ladder_.residuals = touches::Residuals(o, ladder_.prediction);
+    std::vector<double> best = ladder_.residuals;
+    if (has_formula()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Fit whole, FitAll(workspace_, selection_.fit));
+      climb_.with_formula = whole.model.base();
+      engine::RoundValues(whole, &*climb_.with_formula);
+      for (const int index : superfluous)
+        climb_.with_formula->effects.erase(climb_.with_formula->effects.begin() + index);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
+                                  workspace_.predictor->Run(*climb_.with_formula, false, false));
+      best = touches::Residuals(o, with);
+    }
+    ladder_.noise_floor = NoiseFloorOf(o, best, climb_.fit.model.size());
+    AddTimeStructure(o, best, &ladder_.noise_floor);
+    ladder_.noise_floor.declared = DeclaredSigma(*workspace_.input.model);
+    ladder_.dropouts = DropoutsInWords(o, ladder_.prediction);
+    return absl::OkStatus();
+  }
+
+  // Values of the given model's effects that were set free: new ones, or zero as far as the data can tell.
+  // Returns the indices of the latter, largest first.
+  absl::StatusOr<std::vector<int>> DescribeGiven() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        engine::GivenEffects given,
+        engine::DescribeGivenEffects(workspace_.experiment, *climb_.searched, climb_.fit,
+                                     climb_.fit.covariance, *workspace_.input.model,
+                                     workspace_.observations->objects));
+    for (const int index : given.superfluous)
+      ladder_.improved.effects.erase(ladder_.improved.effects.begin() + index);
+    ladder_.values_wrong = given.changed();
+    ladder_.changed |= given.changed();
+    ladder_.superfluous = std::move(given.superfluous_names);
+    ladder_.refitted = std::move(given.refitted);
+    return given.superfluous;
+  }
+
+  absl::Status DescribeSteps() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::vector<engine::OrderedStep> ordered,
+        engine::OrderSteps(workspace_.experiment, {*climb_.searched, selection_.initial_effects}, -1,
+                           climb_.steps));
+    for (const engine::OrderedStep& step : ordered) TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(step));
+    return absl::OkStatus();
+  }
+
+  absl::Status DescribeStep(const engine::OrderedStep& ordered) {
+    engine::LadderStep step = engine::DescribeStep(climb_.fit, climb_.fit.covariance, *ordered.step);
+    engine::AddConfounded(step, &ladder_.confounded);
+    AddOrder(ordered.step->effect, &step);
+    step.model = ordered.whole ? ladder_.improved : ordered.fit.model.base();
+    TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOfModel(workspace_, ordered.fit, step.model));
+    climbed_.push_back(ordered.step->effect);
+    ladder_.steps.push_back(std::move(step));
+    return absl::OkStatus();
+  }
+
+  // Objects have sizes and places of their own; what belongs to the rig and differs between objects may differ in time.
+  void AddOrder(int effect, engine::LadderStep* step) const {
+    const model::EffectInstance& instance = climb_.searched->model.base().effects[effect];
+    if (!instance.per_object || instance.effect->often_per_object) return;
+    const std::string words =
+        OrderInWords(*workspace_.observations, climb_.searched->model.OnlyObject(effect), step->parameters);
+    if (!words.empty()) engine::AddWords(words, step);
+  }
+
+  const Workspace& workspace_;
+  const SelectionResult& selection_;
+  Climb climb_;
+  Ladder& ladder_;            // the climb's
+  std::vector<int> climbed_;  // the effect of each of the ladder's steps, by its index in what is saved
+};
+
+}  // namespace
+
+absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit, int max_iterations) {
+  if (!workspace.thinned || fit.hypothesis != 0 || fit.model.size() == 0) return fit;
+  const touches::Observations& o = *workspace.observations;
+  const touches::Contrasts contrasts = WeighedContrasts(workspace, o, workspace.nominal.time_s);
+  const engine::Likelihood likelihood(
+      touches::FirstRowsOfObjects(contrasts, static_cast<int>(o.objects.size())), nullptr, 0, nullptr);
+  const touches::TouchObservationModel rows(o, *workspace.predictor, contrasts, workspace.nominal.time_s);
+  engine::Experiment all = workspace.experiment;
+  all.observations = &rows;
+  all.likelihood = &likelihood;
+  all.pool = nullptr;  // the predictor has the threads
+  TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit whole, engine::FitModel(all, fit.model, max_iterations));
+  whole.columns = fit.columns;  // held-out errors come from the search's touches
+  return whole;
+}
+
+absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection) {
+  return Climber(workspace, selection).Run();
+}
+
+}  // namespace touchstone::diagnosis::selection

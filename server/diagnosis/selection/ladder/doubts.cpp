@@ -1,0 +1,109 @@
+#include "server/diagnosis/selection/ladder/doubts.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/diagnosis/selection/session/session_order.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr int kManyEffects = 3;      // more at once need a reason
+constexpr double kNearTypical = 5;   // sizes over the typical one that are near it
+constexpr double kMaxUnusual = 0.9;  // ... of one that would be larger than rigs show
+// Probability of either of two effects that two speeds cannot tell from another.
+constexpr double kMaxAtTwoSpeeds = 0.5;
+
+// The largest value of the effect over the size that rigs show.
+double SizeOverTypical(const engine::Fit& fit, int index) {
+  double largest = 0;
+  for (int i = 0; i < fit.model.size(); ++i) {
+    const engine::FreeParameter& p = fit.model.parameters()[i];
+    if (p.effect == index) largest = std::max(largest, std::abs(fit.point[i] - p.neutral) / p.scale);
+  }
+  return largest;
+}
+
+// "14 mm", where a value of the step is beyond what rigs show, and the limit; empty: none is.
+std::string UnusualValue(const model::Effect& effect, const engine::LadderStep& step) {
+  const engine::ParameterEstimate* farthest = nullptr;
+  double most = 1, limit = 0;
+  for (const engine::ParameterEstimate& e : step.parameters)
+    for (const model::ParameterInfo& p : effect.parameters) {
+      const double usual = e.value < 0 ? p.usual_lower : p.usual_upper;
+      if (p.name != e.name || !std::isfinite(usual) || usual == 0 || e.value / usual <= most) continue;
+      farthest = &e;
+      most = e.value / usual;
+      limit = std::abs(usual);
+    }
+  if (farthest == nullptr) return "";
+  return absl::StrFormat(
+      "Would need %.3g %s, more than rigs show (up to %.3g %s): look for a mistake in the set-up.",
+      farthest->value, farthest->unit, limit, farthest->unit);
+}
+
+}  // namespace
+
+void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                        Ladder* ladder) {
+  for (const engine::SelectedStep& selected : steps) {
+    const model::Effect& effect = *fit.model.base().effects[selected.effect].effect;
+    for (engine::LadderStep& step : ladder->steps) {
+      if (step.effect != engine::NameOf(effect)) continue;
+      const std::string words = UnusualValue(effect, step);
+      if (words.empty()) continue;
+      engine::AddWords(words, &step);
+      step.probability = std::min(step.probability, kMaxUnusual);
+    }
+  }
+}
+
+std::string StrangeValuesInWords(const engine::Fit& fit, const std::vector<engine::SelectedStep>& steps,
+                                 Ladder* ladder) {
+  int effects = 0, near_typical = 0;
+  std::vector<std::string> stopped;
+  for (const engine::SelectedStep& selected : steps) {
+    ++effects;
+    near_typical += SizeOverTypical(fit, selected.effect) <= kNearTypical;
+    if (!engine::IsAtBound(fit, selected.effect)) continue;
+    const std::string name = engine::NameOf(*fit.model.base().effects[selected.effect].effect);
+    stopped.push_back(name);
+    for (engine::LadderStep& step : ladder->steps)
+      if (step.effect == name)
+        engine::AddWords("The value is at the catalogue's bound: the data ask for one beyond it.", &step);
+  }
+  if (!stopped.empty())
+    return absl::StrCat("The data ask for more of ", absl::StrJoin(stopped, ", "),
+                        " than the catalogue allows: a value at its bound explains nothing.");
+  if (effects > kManyEffects && near_typical == 0)
+    return absl::StrCat("It would take ", effects,
+                        " effects at once, none near the size that rigs show: something else is wrong.");
+  return "";
+}
+
+void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
+                    const std::vector<engine::SelectedStep>& steps, Ladder* ladder) {
+  // The touch of each row of the search.
+  std::vector<int> touches;
+  for (const int t : workspace.contrasts->touch_of_row())
+    touches.push_back(workspace.contrasts->touches()[t]);
+  const auto name_of = [&](size_t step) {
+    return engine::NameOf(*fit.model.base().effects[steps[step].effect].effect);
+  };
+  for (const auto& [one, other] : PairsAtTwoSpeeds(*workspace.searched, touches, fit, steps)) {
+    const std::string names[] = {name_of(one), name_of(other)};
+    for (engine::LadderStep& step : ladder->steps) {
+      if (step.effect != names[0] && step.effect != names[1]) continue;
+      engine::AddWords(absl::StrCat("At two speeds, whatever depends on the speed is some sum of ", names[0],
+                                    " and ", names[1], ": measure at a third one."),
+                       &step);
+      step.probability = std::min(step.probability, kMaxAtTwoSpeeds);
+    }
+  }
+}
+
+}  // namespace touchstone::diagnosis::selection

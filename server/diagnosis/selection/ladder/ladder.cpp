@@ -1,0 +1,320 @@
+#include "server/diagnosis/selection/ladder/ladder.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/readable_time.h"
+#include "server/base/status.h"
+#include "server/diagnosis/engine/candidate_ranking.h"
+#include "server/diagnosis/engine/findings.h"
+#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/selection/ladder/climb.h"
+#include "server/diagnosis/selection/ladder/doubts.h"
+#include "server/diagnosis/selection/ladder/hypotheses.h"
+#include "server/diagnosis/selection/ladder/model_posterior.h"
+#include "server/diagnosis/selection/ladder/surface_step.h"
+#include "server/diagnosis/selection/scatter/lopsided_scatter.h"
+#include "server/diagnosis/selection/scatter/pose_scatter.h"
+#include "server/diagnosis/selection/scatter/touches_set_aside.h"
+#include "server/diagnosis/selection/scatter/uneven_scatter.h"
+#include "server/diagnosis/selection/session/round_structure.h"
+#include "server/diagnosis/selection/session/time_structure.h"
+#include "server/diagnosis/selection/unsupported_steps.h"
+#include "server/diagnosis/touches/noise_sample.h"
+#include "server/diagnosis/touches/ticks.h"
+#include "server/effects/all_effects.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+constexpr double kSurfaceNats = 5;        // evidence that asks for a surface error by itself
+constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
+constexpr double kMisfitP = 1e-2;
+constexpr double kRoundsPossibleP =
+    0.05;  // of agreement within rounds, for a doubt of what scatter looks like
+constexpr double kMaxBesideMotion = 0.5;  // probability of noise where an object that moves would look alike
+constexpr double kSameSurface =
+    2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
+
+// The error as a comparison finds it; the held-out error keeps its ratio to the fit's.
+absl::Status SetErrors(const Workspace& workspace, const engine::Fit& fit,
+                       engine::RankedCandidate* candidate) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(candidate->rmse, ErrorAsCompared(workspace, fit.model.base()));
+  candidate->heldout_rmse =
+      candidate->rmse * HeldOutRatio(fit, engine::HeldOutRmse(workspace.experiment, fit));
+  return absl::OkStatus();
+}
+
+// What follows the climb: what the steps leave, which noise, how sure of all this.
+class LadderBuilder {
+ public:
+  LadderBuilder(const Workspace& workspace, const SelectionResult& selection, Climb climb)
+      : workspace_(workspace),
+        selection_(selection),
+        climb_(std::move(climb)),
+        ladder_(climb_.ladder),
+        observations_(*workspace.observations) {}
+
+  absl::StatusOr<Ladder> Build() {
+    AddOfSelection();
+    DoubtSteps();
+    AskRounds();
+    AskTicks();
+    TOUCHSTONE_RETURN_IF_ERROR(SetFinal());
+    TOUCHSTONE_RETURN_IF_ERROR(AskSurface());
+    AskPoseScatter();
+    if (found_.Allows(Question::kMisfit) && engine::StructureRemains(left_, ladder_.noise_floor.sigma))
+      found_.Add(Hypothesis::kMisfit);
+    AddNoise();
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        ladder_.candidates,
+        engine::RankCandidates(*selection_.search, selection_.initial_model, selection_.initial_effects,
+                               [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
+                                 return SetErrors(workspace_, fit, candidate);
+                               }));
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeRest());
+    ladder_.verdict = found_.Leave(Leaves::kScatter) ? engine::Verdict::kUnexplained
+                      : !ladder_.steps.empty()       ? engine::Verdict::kMissingEffects
+                      : ladder_.values_wrong         ? engine::Verdict::kWrongValues
+                                                     : engine::Verdict::kAdequate;
+    if (ladder_.changed && !ladder_.improved.name.empty()) ladder_.improved.name += "_better";
+    TOUCHSTONE_RETURN_IF_ERROR(AddPosterior());
+    return std::move(ladder_);
+  }
+
+ private:
+  using NameFirst = Hypotheses::NameFirst;
+
+  // What competed with the effects of the catalogue.
+  void AddOfSelection() {
+    const NameFirst name_time = [this](engine::UnexplainedRest* rest) {
+      NameTimeFirst(observations_, ladder_.noise_floor, rest);
+    };
+    if (selection_.memory && Walks())
+      found_.Add(Hypothesis::kWalk,
+                 "The fingers wander through the whole session, and nothing shows that they come back: a "
+                 "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
+                 "session.",
+                 name_time);
+    else if (selection_.memory)
+      found_.Add(Hypothesis::kWander);
+    if (found_.Allows(Question::kCourse) && SharesTime(ladder_.noise_floor))
+      found_.Add(Hypothesis::kCourse, "", name_time);
+    if (selection_.group)
+      found_.Add(Hypothesis::kGroup, selection_.group->words, [this](engine::UnexplainedRest* rest) {
+        rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
+      });
+    if (selection_.partial) found_.Add(Hypothesis::kPartialOffset, selection_.partial->words);
+    if (selection_.formula >= 0) found_.Add(Hypothesis::kFormula);
+    if (selection_.curve) found_.Add(Hypothesis::kCurve, CourseInWords(selection_.curve->words));
+  }
+
+  // A wander of which the session does not show that it comes back is no noise of a known memory, unless the given
+  // model says so.
+  bool Walks() const {
+    const auto& given = workspace_.input.model->effects;
+    return !Forgets(*selection_.memory) &&
+           std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
+             return instance.effect->role == model::EffectRole::kNoiseMemory;
+           });
+  }
+
+  static std::string CourseInWords(std::string words) {
+    if (words.empty()) return words;
+    words[0] = absl::ascii_toupper(words[0]);
+    return absl::StrCat(words, ".");
+  }
+
+  void DoubtSteps() {
+    DoubtUnusualValues(climb_.fit, climb_.steps, &ladder_);
+    DoubtTwoSpeeds(workspace_, *climb_.searched, climb_.steps, &ladder_);
+    std::string strange = StrangeValuesInWords(climb_.fit, climb_.steps, &ladder_);
+    if (!strange.empty()) found_.Add(Hypothesis::kStrangeValues, std::move(strange));
+  }
+
+  void AskRounds() {
+    if (!found_.Allows(Question::kRounds)) return;
+    const double sigma_s = ladder_.noise_floor.sigma;
+    rounds_ = FindRoundStructure(observations_, ladder_.prediction, ladder_.residuals);
+    if (SharesRounds(rounds_, sigma_s))
+      found_.Add(Hypothesis::kRemounted, RoundsInWords(rounds_, sigma_s),
+                 [this](engine::UnexplainedRest* rest) { NameRoundFirst(rounds_, rest); });
+  }
+
+  void AskTicks() {
+    const touches::TouchTicks ticks = touches::FindTouchTicks(observations_);
+    if (!ticks.in_part()) return;
+    found_.Add(
+        Hypothesis::kTicks,
+        absl::StrFormat("The times of %d of %d touches lie on ticks of %s, those of the others do not: "
+                        "they were read in two ways.",
+                        ticks.touches, ticks.compared, TimeInWords(ticks.interval_s)));
+  }
+
+  // The errors of the improved model. New values that compare worse are none.
+  absl::Status SetFinal() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(left_, QualityOf(workspace_, *climb_.searched, ladder_.residuals));
+    ladder_.final = left_;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double final_s, ErrorAsCompared(workspace_, ladder_.improved));
+    SetError(final_s, &ladder_.final);
+    if (ladder_.steps.empty() && ladder_.values_wrong && ladder_.final.rmse > climb_.before.rmse) {
+      ladder_.improved = *workspace_.input.model;
+      ladder_.final = climb_.before;
+      ladder_.refitted.clear(), ladder_.superfluous.clear();
+      ladder_.values_wrong = ladder_.changed = false;
+    }
+    ladder_.set_aside = AssessTouchesSetAside(observations_, ladder_.residuals, ladder_.final.rmse,
+                                              ladder_.noise_floor.sigma);
+    if (ladder_.set_aside.is_finding) found_.Add(Hypothesis::kSetAside, ladder_.set_aside.words);
+    return absl::OkStatus();
+  }
+
+  const model::EffectInstance* GivenSurface() const {
+    for (const model::EffectInstance& e : workspace_.input.model->effects)
+      if (e.effect->role == model::EffectRole::kSmoothError) return &e;
+    return nullptr;
+  }
+
+  // Bumps of the surface may be the last step, where nothing else accounts for them.
+  absl::Status AskSurface() {
+    if (selection_.fit.hypothesis == 0 || !found_.Allows(Question::kSurface)) return absl::OkStatus();
+    const double gain_nats = selection_.surface_error.gain_nats;
+    const bool misfit = left_.lack_of_fit_p < kMisfitP;
+    if (!(gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit))) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const SurfaceSupport support, FindSurfaceSupport(workspace_, selection_.fit));
+    const model::EffectInstance* given = GivenSurface();
+    const double rms_m = selection_.surface_error.rms_m;
+    // The model may say that surfaces are as wrong as this.
+    const bool as_given = given != nullptr && rms_m < kSameSurface * given->values[0];
+    if (as_given || support.IsSurface()) {
+      left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
+      if (as_given) return absl::OkStatus();
+      if (given == nullptr)
+        return AddSurfaceStep(workspace_, selection_, support, left_.lack_of_fit_p, &ladder_);
+      RefitSurfaceError(selection_.surface_error, &ladder_);
+      return absl::OkStatus();
+    }
+    if (gain_nats > kSurfaceNats && support.IsElsewhere())
+      found_.Add(Hypothesis::kUnplaced, support.WordsOfRest());
+    return absl::OkStatus();
+  }
+
+  void AskPoseScatter() {
+    if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
+    first_of_noise_ = ladder_.steps.size();
+    if (!found_.Allows(Question::kPoseScatter)) return;
+    pose_scatter_ = FindPoseScatter(observations_, ladder_.prediction, ladder_.residuals, selection_.noise);
+    if (pose_scatter_ && pose_scatter_->ahead) found_.Add(Hypothesis::kPlay, pose_scatter_->words);
+  }
+
+  void AddNoise() {
+    if (found_.Allows(Question::kNoise) && !ladder_.noise_floor.is_rounding) {
+      touches::NoiseFindings noise = selection_.noise;
+      AskUnevenScatter(&noise);
+      AddNoiseSteps(std::move(noise), selection_.memory.has_value(), &ladder_);
+    }
+    DoubtNoise();
+    if (found_.Allows(Question::kAbsentMemory)) RemoveAbsentMemory(observations_, &ladder_);
+  }
+
+  // Where something else makes touches scatter, parts of the set scatter differently for that reason; repeats know nothing
+  // of a misfit.
+  void AskUnevenScatter(touches::NoiseFindings* noise) {
+    const bool misfit = found_.Has(Hypothesis::kFormula) || found_.Has(Hypothesis::kMisfit) ||
+                        found_.Has(Hypothesis::kUnplaced) || found_.Leave(Leaves::kDoubts) ||
+                        selection_.fit.hypothesis != 0;
+    if (!found_.Allows(Question::kUnevenScatter) || (!ladder_.noise_floor.from_repeats && misfit)) return;
+    const touches::NoiseSample sample =
+        touches::MakeNoiseSample(observations_, ladder_.residuals, ladder_.prediction);
+    uneven_ = FindUnevenScatter(observations_, ladder_.prediction, sample, selection_.noise);
+    if (!uneven_) return AskLopsidedScatter(sample, noise);
+    found_.Add(Hypothesis::kUnevenScatter, uneven_->words, [this](engine::UnexplainedRest* rest) {
+      NameUnevenScatter(*uneven_, found_.Leave(Leaves::kMeans), rest);
+    });
+    if (!uneven_->tails_remain) noise->degrees_of_freedom = {};
+    if (uneven_->finger >= 0) noise->channel_sigma_s.clear();
+  }
+
+  // What reaches farther to one side looks heavy-tailed.
+  void AskLopsidedScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
+    if (selection_.noise.poll_interval_s.gain_nats > 0) return;
+    const auto lopsided = FindLopsidedScatter(sample.groups);
+    if (!lopsided) return;
+    found_.Add(Hypothesis::kLopsided, lopsided->words);
+    noise->degrees_of_freedom = {};
+  }
+
+  // Of the steps of noise, what an object that moves would look like.
+  void DoubtNoise() {
+    for (size_t j = first_of_noise_; j < ladder_.steps.size(); ++j) {
+      engine::LadderStep& step = ladder_.steps[j];
+      if (rounds_.p < kRoundsPossibleP) {
+        step.probability = std::min(step.probability, kMaxBesideMotion);
+        step.words = "Repeats agree within rounds: an object put down anew each round would look alike.";
+      }
+      const auto level = effects::FindByRole(model::EffectRole::kNoiseLevel);
+      if (!pose_scatter_ || step.effect == level->name) continue;
+      step.probability = std::min(step.probability, kMaxBesideMotion);
+      engine::AddWords(pose_scatter_->words, &step);
+    }
+  }
+
+  absl::Status DescribeRest() {
+    if (!found_.Leave(Leaves::kScatter)) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
+                                DescribeUnexplained(workspace_, selection_, ladder_.final,
+                                                    ladder_.noise_floor.sigma, climb_.with_formula));
+    found_.NameCovariates(&*ladder_.unexplained);
+    ladder_.unexplained->words = found_.Words();
+    if (found_.Leave(Leaves::kMeans))
+      engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), found_.Leave(Leaves::kDoubts)),
+                              &ladder_.steps, &ladder_.candidates);
+    return absl::OkStatus();
+  }
+
+  // Of the mean square error that is no noise, what the steps take away.
+  double ExplainedShare() const {
+    return engine::ExplainedShare(
+        touches::Rmse(observations_, touches::Residuals(observations_, workspace_.nominal)), left_.rmse,
+        ladder_.noise_floor.sigma);
+  }
+
+  absl::Status AddPosterior() {
+    engine::Fit open = climb_.fit;
+    if (const auto everything = WithEverythingFree(climb_.fit, ladder_.improved)) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(open, engine::FitModel(workspace_.experiment, *everything, 0));
+      TOUCHSTONE_ASSIGN_OR_RETURN(open, FitAll(workspace_, open, 0));
+    }
+    ladder_.posterior = PosteriorOf(workspace_, open, *climb_.searched, ladder_);
+    return absl::OkStatus();
+  }
+
+  const Workspace& workspace_;
+  const SelectionResult& selection_;
+  Climb climb_;
+  Ladder& ladder_;  // the climb's
+  const touches::Observations& observations_;
+  Hypotheses found_;
+  engine::Quality left_;  // on the touches that the fits used: what the verdict is about
+  RoundStructure rounds_;
+  size_t first_of_noise_ = 0;  // step
+  std::optional<PoseScatter> pose_scatter_;
+  std::optional<UnevenScatter> uneven_;
+};
+
+}  // namespace
+
+absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* selection) {
+  for (;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(Climb climb, ClimbSteps(workspace, *selection));
+    if (climb.without_gain < 0) return LadderBuilder(workspace, *selection, std::move(climb)).Build();
+    TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, climb.without_gain, selection));
+    TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(selection));
+  }
+}
+
+}  // namespace touchstone::diagnosis::selection

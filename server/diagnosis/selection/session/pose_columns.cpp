@@ -1,0 +1,30 @@
+#include "server/diagnosis/selection/session/pose_columns.h"
+
+#include <cmath>
+
+namespace touchstone::diagnosis::selection {
+
+bool HasPoseColumns(const touches::Observations& o, const touches::Prediction& d,
+                    const std::vector<double>& residuals, int k) {
+  for (int i = 0; i < o.fingers; ++i) {
+    const size_t e = static_cast<size_t>(k) * o.fingers + i;
+    if (!std::isfinite(residuals[e]) || !d.contact_m[e].allFinite() || !d.normal[e].allFinite() ||
+        !std::isfinite(d.inverse_speed_s_per_m[e]) || !(d.cos_incidence[e] > kMinCosine))
+      return false;
+  }
+  return true;
+}
+
+Eigen::MatrixXd PoseColumns(const touches::Observations& o, const touches::Prediction& d, int k) {
+  Eigen::MatrixXd columns(o.fingers, kPoseValues);
+  const Eigen::Vector3d& approach = o.set->approach[o.row[k]];
+  for (int i = 0; i < o.fingers; ++i) {
+    const size_t e = static_cast<size_t>(k) * o.fingers + i;
+    const Eigen::Vector3d per_metre = d.normal[e] / d.normal[e].dot(approach) * d.inverse_speed_s_per_m[e];
+    columns.row(i) << per_metre.transpose(), d.contact_m[e].cross(per_metre).transpose();
+  }
+  columns.rowwise() -= columns.colwise().mean().eval();
+  return columns;
+}
+
+}  // namespace touchstone::diagnosis::selection
