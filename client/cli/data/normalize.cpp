@@ -96,7 +96,7 @@ class NormalizeRun {
       return absl::AlreadyExistsError(
           absl::StrCat("-o: ", options_.output,
                        " is there and not empty; a new folder was expected, so that nothing is replaced"));
-    finished_ = fs::weakly_canonical(options_.output, error);  // a link stays one
+    finished_ = fs::absolute(fs::weakly_canonical(options_.output, error));  // a link stays one
     if (!finished_.has_filename()) finished_ = finished_.parent_path();
     unfinished_ = UnfinishedPathOf(finished_.string());
     if (!error) fs::create_directories(finished_.parent_path(), error);
