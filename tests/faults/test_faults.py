@@ -126,7 +126,8 @@ def test_silent_and_slow_clients_do_not_shut_others_out(handshake_s):
     passes(silent_and_slow.run(handshake_s=handshake_s))
 
 
-QUICK_FLOODS = ("rapid resets of streams", "heads without an end", "pings whose answers nobody reads", "reflection without a message")
+QUICK_FLOODS = ("rapid resets of streams", "whole calls of every other method", "heads without an end", "pings whose answers nobody reads",
+                "reflection without a message")
 
 
 @pytest.mark.parametrize("seconds, names", [(1.5, QUICK_FLOODS), pytest.param(60, (), marks=pytest.mark.second_tier(

@@ -246,6 +246,33 @@ TEST_F(Safety, AFingerThatSticksInMidApproachIsNamedAndItsTouchIsRefused) {
     EXPECT_EQ(touch.stage, session::TouchStage::kDone) << touch.id << ": " << touch.error;
 }
 
+TEST_F(Safety, AFingerThatSticksAndFreesItselfInMidApproachIsNamedAndItsTouchIsRefused) {
+  StartRig();
+  StartGateway();
+  KeptLease lease(control_.get(), "client", true);
+  ASSERT_TRUE(Touch(lease.token(), FromAbove(), "good").status.ok());
+  auto answer = TouchLater(lease.token(), FromAbove(kSlow, 1), "sticks");
+  WaitUntilApproaching();
+  const auto reads = [this](bool pressed) {
+    const v1::EffectorStatus effector = RigState().effector();
+    return effector.pressed_size() == 3 && effector.pressed(1) == pressed;
+  };
+  emulator_->faults().Set("stuck_finger", 1);
+  WaitUntil([&] { return reads(true); }, "the finger reads pressed");
+  emulator_->faults().Set("stuck_finger", -1);
+  WaitUntil([&] { return reads(false); }, "the finger reads free");
+  ASSERT_EQ(RigState().arm().phase(), v1::MOTION_PHASE_APPROACH) << "it freed itself in mid-approach";
+  const grpc::Status refused = answer.get().status;
+  EXPECT_EQ(refused.error_code(), grpc::FAILED_PRECONDITION);
+  EXPECT_THAT(refused.error_message(), HasSubstr("finger 2 let go"));
+  EXPECT_THAT(refused.error_message(), HasSubstr("while the tool still approached"));
+  EXPECT_EQ(State(), v1::SOURCE_STATE_IDLE);
+  ExpectTheTouchCanBeMade(FromAbove(kSlow, 1), "sticks");
+  StopGateway();
+  for (const session::JournalTouch& touch : Journalled())
+    EXPECT_EQ(touch.stage, session::TouchStage::kDone) << touch.id << ": " << touch.error;
+}
+
 TEST_F(Safety, AFingerThatStaysSilentEndsTheApproachBeforeTheOthersArePushedTooFar) {
   StartRig();
   StartGateway();

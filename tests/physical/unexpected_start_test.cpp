@@ -17,9 +17,18 @@ using testing::HasSubstr;
 
 class UnexpectedStart : public Latch {
  protected:
-  // A program of somebody else, over the interface that anybody on the network can use.
+  // A program of somebody else, over the interface that anybody on the network can use. Whoever hangs up with states unread
+  // before it was taken resets the connection, and the program is lost.
   void SendForeign(const std::string& program) {
-    rig::TestClient(emulator_->controller().ports().secondary).Send(program);
+    const size_t commands = CommandCount();
+    rig::TestClient somebody(emulator_->controller().ports().secondary);
+    somebody.Send(program);
+    WaitUntil(
+        [&] {
+          const std::vector<std::string> since = CommandsSince(commands);
+          return std::find(since.begin(), since.end(), "program swing") != since.end();
+        },
+        "the controller has the program");
   }
   // Whatever the touch became: nothing moves any more, and nothing that retries changes that.
   void ExpectLatchedAndAtRest(const std::string& because) {
@@ -28,6 +37,12 @@ class UnexpectedStart : public Latch {
     const uint64_t motions = emulator_->controller().Count("motions");
     ExpectNothingMovesUntilReset(because);
     EXPECT_EQ(emulator_->controller().Count("motions"), motions);
+  }
+  // The arm itself: the second of the two programs that a stop sends may begin later, and moves nothing.
+  void ExpectThatItStands() {
+    const Eigen::Isometry3d before = emulator_->controller().BaseFromTip();
+    WaitForRigTime(0.5);
+    EXPECT_LT((emulator_->controller().BaseFromTip().translation() - before.translation()).norm(), 1e-9);
   }
   void ExpectResetAndPowerLetItMove(const std::string& id, double which = 0) {
     grpc::Status reset;
@@ -286,7 +301,7 @@ TEST_F(UnexpectedStart, AStopThatTheControllerIgnoresIsConfirmedOnlyOnceTheArmSt
   grpc::ClientContext context;
   ASSERT_TRUE(control_->Stop(&context, request, &response).ok());
   if (response.standstill())
-    EXPECT_FALSE(emulator_->controller().Moving()) << "the watchdog had ended it before this was said";
+    ExpectThatItStands();  // the watchdog had ended it before this was said
   else
     EXPECT_THAT(response.not_confirmed(), AllOf(HasSubstr("NOT CONFIRMED"), HasSubstr("emergency stop")));
   EXPECT_FALSE(touch.get().status.ok());
@@ -304,7 +319,7 @@ TEST_F(UnexpectedStart, AStopOfAMotionIsConfirmedByStandstill) {
   grpc::ClientContext context;
   ASSERT_TRUE(control_->Stop(&context, request, &response).ok());
   EXPECT_TRUE(response.standstill()) << response.not_confirmed();
-  EXPECT_FALSE(emulator_->controller().Moving());
+  ExpectThatItStands();
   EXPECT_FALSE(touch.get().status.ok());
 }
 

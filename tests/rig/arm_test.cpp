@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <thread>
 
 #include "server/base/test_folder.h"
@@ -17,6 +18,7 @@ namespace touchstone {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double kPatienceS = 60;  // host time; the machine may be busy
@@ -393,31 +395,68 @@ TEST_F(EmulatedArm, SoftwareWithoutItsRegistersIsNamedWithItsVersionAndWhatWould
   EXPECT_TRUE(Wait([&] { return arm_->State().ok(); })) << "connects again by itself";
 }
 
-TEST(UrArm, PowersOnAndReleasesTheBrakes) {
-  rig::SimClock clock(20);
-  rig::Faults faults;
-  rig::ControllerOptions options;
-  options.model = "ur3";
-  const auto controller = rig::Controller::Start(options, &clock, &faults, nullptr);
-  gateway::arm::UrArmOptions arm_options;
-  arm_options.model = "ur3";
-  arm_options.address = "127.0.0.1";
-  arm_options.dashboard_port = controller->ports().dashboard;
-  arm_options.primary_port = controller->ports().primary;
-  arm_options.secondary_port = controller->ports().secondary;
-  arm_options.rtde_port = controller->ports().rtde;
-  arm_options.script.time_scale = 20;
-  // As for the other tests: a busy machine's pauses are no frozen controller.
-  arm_options.frozen_after_s = 3;
-  arm_options.program_start_s = 10;
-  arm_options.connect_wait_s = kPatienceS;
-  gateway::timing::ChangeNotifier changes;
-  const auto arm = gateway::arm::ConnectUrArm(arm_options, &changes).value();
-  EXPECT_EQ(arm->Ready().code(), absl::StatusCode::kFailedPrecondition) << arm->Ready();
-  EXPECT_THAT(std::string(arm->Ready().message()), HasSubstr("POWER_OFF"));
-  const absl::Status powered = arm->PowerOn([] { return absl::OkStatus(); });
+// An arm without power.
+class UnpoweredArm : public testing::Test {
+ protected:
+  static constexpr double kSpeedup = 20;
+  UnpoweredArm() {
+    rig::ControllerOptions options;
+    options.model = "ur3";
+    controller_ = rig::Controller::Start(options, &clock_, &faults_, nullptr);
+    gateway::arm::UrArmOptions arm;
+    arm.model = "ur3";
+    arm.address = "127.0.0.1";
+    arm.dashboard_port = controller_->ports().dashboard;
+    arm.primary_port = controller_->ports().primary;
+    arm.secondary_port = controller_->ports().secondary;
+    arm.rtde_port = controller_->ports().rtde;
+    arm.script.time_scale = kSpeedup;
+    // As for the other tests: a busy machine's pauses are no frozen controller.
+    arm.frozen_after_s = 3;
+    arm.program_start_s = 10;
+    arm.connect_wait_s = kPatienceS;
+    arm_ = gateway::arm::ConnectUrArm(arm, &changes_).value();
+  }
+  void Await(const std::function<bool(const absl::StatusOr<gateway::arm::ArmState>&)>& wanted) {
+    const double until_s = gateway::timing::HostNowS() + kPatienceS;
+    while (gateway::timing::HostNowS() < until_s) {
+      const uint64_t seen = changes_.count();
+      if (wanted(arm_->State())) return;
+      changes_.WaitForChange(seen, 0.02);
+    }
+    FAIL() << arm_->State().status();
+  }
+  bool Boots() {
+    const auto state = arm_->State();
+    return state.ok() && state->robot_mode == gateway::arm::RobotMode::kBooting;
+  }
+
+  rig::SimClock clock_{kSpeedup};
+  rig::Faults faults_;
+  std::unique_ptr<rig::Controller> controller_;
+  gateway::timing::ChangeNotifier changes_;
+  std::unique_ptr<gateway::arm::UrArm> arm_;
+};
+
+TEST_F(UnpoweredArm, IsPoweredOnAndReleasesItsBrakes) {
+  EXPECT_EQ(arm_->Ready().code(), absl::StatusCode::kFailedPrecondition) << arm_->Ready();
+  EXPECT_THAT(std::string(arm_->Ready().message()), HasSubstr("POWER_OFF"));
+  const absl::Status powered = arm_->PowerOn([] { return absl::OkStatus(); });
   EXPECT_TRUE(powered.ok()) << powered;
-  EXPECT_TRUE(arm->Ready().ok()) << arm->Ready();
+  EXPECT_TRUE(arm_->Ready().ok()) << arm_->Ready();
+}
+
+// "power on" is valid from POWER_OFF alone (docs.ros.org, ur_robot_driver: robot modes).
+TEST_F(UnpoweredArm, IsNotToldToPowerOnWhileItsControllerBoots) {
+  // Once more where a busy machine was connected again only after it had booted.
+  do {
+    faults_.Set("power_cut", 0.05);
+    Await([](const auto& state) { return !state.ok(); });
+    Await([](const auto& state) { return state.ok(); });
+  } while (!Boots());
+  const absl::Status powered = arm_->PowerOn([] { return absl::OkStatus(); });
+  EXPECT_TRUE(powered.ok()) << powered;
+  EXPECT_THAT(controller_->Commands(), ElementsAre("power on", "brake release"));
 }
 
 // Without a program that compiles nothing starts, and the error says what the controller said.

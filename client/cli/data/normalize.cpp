@@ -65,12 +65,13 @@ class NormalizeRun {
   NormalizeRun(const Cli& cli, const NormalizeOptions& options) : cli_(cli), options_(options) {}
 
   absl::Status Run() {
-    bool is_new = false;
-    TOUCHSTONE_RETURN_IF_ERROR(MakeOutput(&is_new));
+    TOUCHSTONE_RETURN_IF_ERROR(MakeUnfinished());
     const bool is_set = session::IsImageSetFolder(options_.folder);
-    if (const absl::Status status = RunInto(is_set); !status.ok()) {
-      std::error_code not_empty;
-      if (is_new) fs::remove(options_.output, not_empty);  // pictures that were written before the error stay
+    absl::Status status = RunInto(is_set);
+    if (status.ok()) status = Finish();
+    if (!status.ok()) {
+      std::error_code stays;  // a hidden folder, if the disk fails at that too
+      fs::remove_all(unfinished_, stays);
       return status;
     }
     if (cli_.output().json)
@@ -88,17 +89,28 @@ class NormalizeRun {
   }
 
  private:
-  absl::Status MakeOutput(bool* is_new) const {
+  // The results stand in a hidden folder until they are whole.
+  absl::Status MakeUnfinished() {
     std::error_code error;
     if (fs::exists(options_.output, error) && !fs::is_empty(options_.output, error))
       return absl::AlreadyExistsError(
           absl::StrCat("-o: ", options_.output,
                        " is there and not empty; a new folder was expected, so that nothing is replaced"));
-    *is_new = fs::create_directories(options_.output, error);
+    finished_ = fs::absolute(fs::weakly_canonical(options_.output, error));  // a link stays one
+    if (!finished_.has_filename()) finished_ = finished_.parent_path();
+    unfinished_ = UnfinishedPathOf(finished_.string());
+    if (!error) fs::create_directories(finished_.parent_path(), error);
+    if (!error) fs::create_directory(unfinished_, error);
     if (error)
       return absl::InvalidArgumentError(
           absl::StrCat("-o: ", options_.output, " cannot be made: ", error.message()));
     return absl::OkStatus();
+  }
+
+  // Takes the place of an empty folder.
+  absl::Status Finish() const {
+    TOUCHSTONE_RETURN_IF_ERROR(SyncPath(unfinished_.string()));
+    return RenameSynced(unfinished_.string(), finished_.string());
   }
 
   absl::Status RunInto(bool is_set) {
@@ -131,7 +143,7 @@ class NormalizeRun {
   absl::Status WriteMask(const image::Image& normalized, const std::string& result) const {
     if (!options_.masks) return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string mask, EncodeMask(normalized));
-    return WriteFileAtomically((fs::path(options_.output) / MaskOf(result)).string(), mask);
+    return WriteFileAtomically((unfinished_ / MaskOf(result)).string(), mask);
   }
 
   absl::Status RunFolder() {
@@ -152,7 +164,7 @@ class NormalizeRun {
       TOUCHSTONE_ASSIGN_OR_RETURN(
           const std::string png,
           image::EncodePng(normalized.pixels.data(), normalized.width, normalized.height, 1));
-      TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically((fs::path(options_.output) / job.result).string(), png));
+      TOUCHSTONE_RETURN_IF_ERROR(WriteFileAtomically((unfinished_ / job.result).string(), png));
       TOUCHSTONE_RETURN_IF_ERROR(WriteMask(normalized, job.result));
     }
     bar.Clear();
@@ -181,11 +193,12 @@ class NormalizeRun {
       }
     }
     bar.Clear();
-    return session::WriteImageSetFiles(files, options_.output, masks);
+    return session::WriteImageSetFiles(files, unfinished_.string(), masks);
   }
 
   const Cli& cli_;
   const NormalizeOptions& options_;
+  fs::path finished_, unfinished_;
   std::optional<image::Image> background_;
   size_t done_ = 0;
   std::vector<std::string> without_object_;

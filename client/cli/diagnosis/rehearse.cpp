@@ -11,6 +11,7 @@
 #include "client/cli/diagnosis/rehearsal.h"
 #include "client/source/measurement_csv.h"
 #include "client/source/session_parts.h"
+#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 
@@ -66,31 +67,28 @@ class RehearsalState {
                             absl::StrCat(path, ":", number, ": ", set.status().message()));
       state.sets_.push_back(*std::move(set));
     }
-    TOUCHSTONE_RETURN_IF_ERROR(state.WriteAll(of));
+    state.text_ = of.dump() + "\n";
+    for (const RehearsedSet& set : state.sets_) absl::StrAppend(&state.text_, ToJson(set).dump(), "\n");
+    TOUCHSTONE_RETURN_IF_ERROR(state.Write());
     return state;
   }
 
   absl::Status Add(RehearsedSet set) {
     sets_.push_back(std::move(set));
     if (path_.empty()) return absl::OkStatus();
-    std::ofstream file(path_, std::ios::app);
-    file << ToJson(sets_.back()).dump() << '\n';
-    file.flush();
-    return file ? absl::OkStatus()
-                : absl::DataLossError(absl::StrCat("--state: ", path_, " cannot be written"));
+    absl::StrAppend(&text_, ToJson(sets_.back()).dump(), "\n");
+    return Write();
   }
   const std::vector<RehearsedSet>& sets() const { return sets_; }
 
  private:
-  absl::Status WriteAll(const Json& of) const {
-    std::ofstream file(path_, std::ios::trunc);
-    file << of.dump() << '\n';
-    for (const RehearsedSet& set : sets_) file << ToJson(set).dump() << '\n';
-    return file ? absl::OkStatus()
-                : absl::InvalidArgumentError(absl::StrCat("--state: ", path_, " cannot be written"));
+  // Whole, beside what it replaces: what was rehearsed before outlives a disk that fails and a kill.
+  absl::Status Write() const {
+    const absl::Status written = WriteFileAtomically(path_, text_);
+    return absl::Status(written.code(), written.ok() ? "" : absl::StrCat("--state: ", written.message()));
   }
 
-  std::string path_;
+  std::string path_, text_;  // where, and what stands there
   std::vector<RehearsedSet> sets_;
 };
 

@@ -31,6 +31,7 @@ void ContactRecord::Begin(uint32_t touch, uint32_t boot_id, int fingers) {
   touch_.touch = touch;
   touch_.boot_id = boot_id;
   touch_.contact_ticks.resize(fingers);
+  touch_.release_ticks.resize(fingers);
   waiting_ = true;
 }
 
@@ -48,6 +49,14 @@ void ContactRecord::EndCapture() {
   armed_ = false;
 }
 
+bool ContactRecord::AwaitsRelease() const {
+  for (size_t i = 0; i < touch_.contact_ticks.size(); ++i) {
+    const bool pressed = (touch_.pressed_mask >> i & 1) != 0;
+    if (touch_.contact_ticks[i].has_value() && !pressed && !touch_.release_ticks[i].has_value()) return true;
+  }
+  return false;
+}
+
 void ContactRecord::MarkLost(std::string why) {
   if (Final()) return;
   armed_ = false;
@@ -59,7 +68,13 @@ ContactRecord::Verdict ContactRecord::OnEvent(const firmware::Event& event, uint
   // Before Armed came it is not known what is too early; the event will come again.
   if (waiting_ || event.finger >= touch_.contact_ticks.size()) return Verdict::kRejected;
   if (event.ticks < touch_.armed_ticks || event.ticks > max_ticks) return Verdict::kRejected;
-  if (event.kind == firmware::EventKind::kRelease) return Verdict::kNew;  // nobody asks for it
+  if (event.kind == firmware::EventKind::kRelease) {
+    // The device tells the first release alone, and may tell it before the contact, whose event was lost.
+    std::optional<uint64_t>& release = touch_.release_ticks[event.finger];
+    if (release.has_value()) return *release == event.ticks ? Verdict::kRepeated : Verdict::kRejected;
+    release = event.ticks;
+    return Verdict::kNew;
+  }
   std::optional<uint64_t>& contact = touch_.contact_ticks[event.finger];
   if (contact.has_value()) {
     if (*contact == event.ticks) return Verdict::kRepeated;

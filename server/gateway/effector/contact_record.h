@@ -36,6 +36,9 @@ class ContactRecord {
   void MarkLost(std::string why);
   void SetPressed(uint32_t mask) { touch_.pressed_mask = mask; }
 
+  // Of a finger that had contact and is not pressed any more it is not known yet when it let go.
+  bool AwaitsRelease() const;
+
   const EffectorTouch& touch() const { return touch_; }
   bool armed() const { return armed_; }
   bool Complete() const { return touch_.Contacts() == static_cast<int>(touch_.contact_ticks.size()); }

@@ -65,5 +65,22 @@ TEST_F(ContactRecordTest, AContactWhoseEventWasLostAfterAReadingIsFoundAtTheEnd)
   EXPECT_EQ(record_.touch().Contacts(), 3);
 }
 
+TEST_F(ContactRecordTest, AReleaseIsAwaitedOfFingersThatHadContactAndAreFree) {
+  EXPECT_FALSE(record_.AwaitsRelease());
+  record_.OnEvent(ContactOf(0, 200), kLatest);
+  record_.SetPressed(0b001);
+  EXPECT_FALSE(record_.AwaitsRelease()) << "it sticks";
+  record_.SetPressed(0);
+  EXPECT_TRUE(record_.AwaitsRelease());
+  firmware::Event release = ContactOf(0, 300);
+  release.kind = firmware::EventKind::kRelease;
+  EXPECT_EQ(record_.OnEvent(release, kLatest), ContactRecord::Verdict::kNew);
+  EXPECT_EQ(record_.OnEvent(release, kLatest), ContactRecord::Verdict::kRepeated);
+  release.ticks = 310;
+  EXPECT_EQ(record_.OnEvent(release, kLatest), ContactRecord::Verdict::kRejected) << "there is one alone";
+  EXPECT_FALSE(record_.AwaitsRelease());
+  EXPECT_EQ(record_.touch().release_ticks[0], 300u);
+}
+
 }  // namespace
 }  // namespace touchstone::gateway::effector

@@ -46,6 +46,8 @@ struct EffectorTouch {
   uint32_t boot_id = 0;
   uint64_t armed_ticks = 0;
   std::vector<std::optional<uint64_t>> contact_ticks;  // per finger; none: no contact yet
+  // Per finger, when it let go first after its contact; none: not yet, or not known (of a record that was recalled).
+  std::vector<std::optional<uint64_t>> release_ticks;
   uint32_t pressed_mask =
       0;  // bit per finger: pressed when the capture had ended and every finger had time to let go
   int Contacts() const;
@@ -77,7 +79,8 @@ class Effector {
   // is asked every 10 ms meanwhile, from this thread; its error ends the wait, and is returned.
   virtual absl::Status StartCapture(uint32_t touch, const std::function<absl::Status()>& guard = nullptr) = 0;
   // Ends it, and waits until the device's record of the touch is known, and until no finger is pressed any more, or should
-  // not be (half a second and twice its debounce time): the tool has left the object before.
+  // not be (half a second and twice its debounce time): the tool has left the object before. The time at which a finger
+  // let go is waited for in four repetitions of its event.
   virtual absl::Status EndCapture() = 0;
   // The contacts of the current or last capture; changes->Notify() after every change. UNAVAILABLE if the line
   // was lost since, or the device was reset, in which case its record is gone.

@@ -48,6 +48,24 @@ TEST_F(EffectorTest, TellsWhichFingersDidNotLetGo) {
   EXPECT_EQ(FingersText(0b10), "finger 2");
 }
 
+TEST_F(EffectorTest, TellsWhenAFingerLetGoAlsoIfTheFirstEventOfItWasLost) {
+  Open(StartQuick());
+  ASSERT_TRUE(effector_->StartCapture(1).ok());
+  device_->Press(0), device_->Press(1);
+  ASSERT_TRUE(WaitForContacts(2));
+  FakeDevice::Line dead;
+  dead.drop = 1;
+  device_->SetLine(dead);
+  const uint64_t truth = device_->Release(1);
+  device_->SetLine(FakeDevice::Line());
+  ASSERT_TRUE(effector_->EndCapture().ok());
+  const absl::StatusOr<EffectorTouch> touch = effector_->Touch();
+  ASSERT_TRUE(touch.ok()) << touch.status();
+  EXPECT_EQ(touch->release_ticks[1], truth);
+  EXPECT_FALSE(touch->release_ticks[0].has_value()) << "pressed still";
+  EXPECT_FALSE(touch->release_ticks[2].has_value()) << "never pressed";
+}
+
 TEST_F(EffectorTest, TellsTimesBeyondTheWrapOfTheCounter) {
   FakeDevice::Options device;
   device.first_tick = 0xffffffff - 300000;  // 0.3 s before

@@ -16,6 +16,9 @@ namespace {
 // 0.1 s late.
 constexpr double kReleaseS = 0.5;
 constexpr double kAskAgainS = 0.01;
+// What the event of a release gets to arrive, rig time: the device sends it again every 50 ms. A finger that let go
+// only after the capture had ended has none.
+constexpr double kReleaseEventS = 0.2;
 
 }  // namespace
 
@@ -177,9 +180,14 @@ absl::Status SerialEffector::EndCaptureOnDevice() {
   const bool unfinished = record_.touch().touch != 0 && record_.lost().empty() && !record_.Final();
   if (unfinished) TOUCHSTONE_RETURN_IF_ERROR(ReconcileTouch());
   TOUCHSTONE_ASSIGN_OR_RETURN(const uint32_t pressed_mask, AwaitRelease());
-  std::lock_guard<std::mutex> lock(mutex_);
-  record_.SetPressed(pressed_mask);
-  return absl::OkStatus();
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    record_.SetPressed(pressed_mask);
+  }
+  return Pump(timing::HostNowS() + kReleaseEventS / options_.time_scale, [this] {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return !record_.AwaitsRelease();
+  });
 }
 
 absl::StatusOr<uint32_t> SerialEffector::AwaitRelease() {

@@ -367,6 +367,26 @@ TEST_F(RigLatch, AStopThatIsNotHeededIsSentAnotherWayAndElseNotConfirmed) {
   }
 }
 
+TEST_F(RigLatch, OneStateAfterAGapConfirmsNoStandstill) {
+  Start();
+  arm_->SetProgram(9, MotionPhase::kTransit, RuntimeState::kPlaying);
+  arm_->heeds_stops = arm_->heeds_other_stops = false;
+  auto stopping = std::async(std::launch::async, [&] { return rig_->Stop("a test", "ana"); });
+  ASSERT_TRUE(WaitFor([&] { return arm_->stops == 1; }));
+  // Whenever it is looked at, there is one state since long, and the arm was elsewhere in the one before.
+  while (stopping.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    clock_.Advance(0.05);
+    arm_->Change([](ArmState* state) {
+      state->runtime_state = RuntimeState::kStopped;
+      state->controller_time_s += 0.06;
+      state->joints_rad[0] += 0.01;
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_THAT(std::string(stopping.get().standstill.message()),
+              AllOf(HasSubstr("NOT CONFIRMED"), HasSubstr("the arm still moves")));
+}
+
 TEST_F(RigLatch, AnArmThatIsPressedAtRestDoesNotBeginToMove) {
   Start();
   arm_->Pass(0.3);

@@ -26,8 +26,9 @@ constexpr double kEndedS = 0.5;  // host time without a program after which ours
 constexpr double kFirstWayS = 0.15, kStandstillS = 1.5;
 constexpr double kStillS = 0.05;  // controller time over which the joints must not move
 constexpr double kStillRad =
-    3e-4;                       // over that; noise of a standing joint is about 2.3e-5 (tests/rig/controller)
-constexpr double kGoneS = 0.3;  // without a state of the controller
+    3e-4;  // over that; noise of a standing joint is about 2.3e-5 (tests/rig/controller)
+constexpr double kStillGapS = 10;  // controller time between two states that still tell of a standstill
+constexpr double kGoneS = 0.3;     // without a state of the controller
 
 bool IsPaused(arm::RuntimeState state) {
   return state == arm::RuntimeState::kPausing || state == arm::RuntimeState::kPaused ||
@@ -202,6 +203,23 @@ double Rig::ControllerNowS() const {
   return now.ok() ? now->controller_time_s : 0;
 }
 
+namespace {
+
+// Whether no program runs and no joint has moved for kStillS. `states`: since the stop, oldest first. A controller that
+// skips states leaves a gap, over which one state alone shows nothing.
+bool StandsStill(const arm::ArmState& now, const std::vector<arm::ArmState>& states) {
+  if (now.runtime_state != arm::RuntimeState::kStopped && now.runtime_state != arm::RuntimeState::kPaused)
+    return false;
+  for (auto state = states.rbegin(); state != states.rend(); ++state) {
+    for (size_t i = 0; i < state->joints_rad.size(); ++i)
+      if (std::abs(state->joints_rad[i] - now.joints_rad[i]) >= kStillRad) return false;
+    if (now.controller_time_s - state->controller_time_s >= kStillS) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 absl::Status Rig::ConfirmStandstill(double from_s) {
   const double began_s = NowS();
   double heard_s = began_s;
@@ -213,16 +231,10 @@ absl::Status Rig::ConfirmStandstill(double from_s) {
     const double now_s = NowS();
     if (now.ok()) heard_s = now_s;
     if (now.ok() && now->controller_time_s < from_s) from_s = now->controller_time_s;  // started anew
-    if (now.ok() && now->controller_time_s - from_s >= kStillS &&
-        (now->runtime_state == arm::RuntimeState::kStopped ||
-         now->runtime_state == arm::RuntimeState::kPaused)) {
-      double farthest_rad = 0;
-      for (const arm::ArmState& state :
-           parts_.arm->History(now->controller_time_s - kStillS, now->controller_time_s))
-        for (size_t i = 0; i < state.joints_rad.size(); ++i)
-          farthest_rad = std::max(farthest_rad, std::abs(state.joints_rad[i] - now->joints_rad[i]));
-      if (farthest_rad < kStillRad) return absl::OkStatus();
-    }
+    if (now.ok() &&
+        StandsStill(*now, parts_.arm->History(std::max(from_s, now->controller_time_s - kStillGapS),
+                                              now->controller_time_s)))
+      return absl::OkStatus();
     if (!otherwise && now_s - began_s > kFirstWayS) {
       otherwise = true;
       second = parts_.arm->StopOtherwise();

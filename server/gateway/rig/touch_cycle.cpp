@@ -74,6 +74,7 @@ absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& p
   record.effector_clock = parts_.effector->Clock();
   record.controller_clock = parts_.arm->ControllerClock();
   record.unix_minus_host_s = timing::UnixNowS() - NowS();
+  TOUCHSTONE_RETURN_IF_ERROR(CheckHeld(record));
   if (command.series) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchSeries states, SeriesOf(record));
     *series = session::JournalSeries{session::kSeriesEncoding, states.SerializeAsString()};

@@ -16,6 +16,10 @@
 namespace touchstone::gateway {
 namespace {
 
+constexpr char kMaybeNoContact[] =
+    "what was reported may be no contact, and the touch is refused; see that the finger moves freely, or "
+    "whether a wire is broken, and touch again";
+
 std::array<double, 6> NoPose() {
   std::array<double, 6> none;
   none.fill(kNaN);
@@ -30,9 +34,7 @@ absl::Status CheckReleased(const effector::EffectorTouch& contacts) {
   return absl::FailedPreconditionError(absl::StrCat(
       effector::FingersText(contacts.pressed_mask), one ? " is" : " are",
       " still pressed although the tool is back at its start: ", one ? "it sticks" : "they stick",
-      ", so that what was reported may be no contact, and the touch is refused; see that the finger moves "
-      "freely, or "
-      "whether a wire is broken, and touch again"));
+      ", so that ", kMaybeNoContact));
 }
 
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,
@@ -59,6 +61,8 @@ namespace {
 // States before the first contact alone, if there are so many: from then on the object holds against the arm.
 constexpr int kEnoughFreeStates = 400;
 constexpr double kFullSpeed = 0.995;  // share
+// What is certain: so many standard uncertainties of the clocks, and what a busy host adds to them.
+constexpr double kSigmas = 4, kBusyHostS = 0.005;
 
 // The approach, as the controller's states show it.
 struct Approach {
@@ -89,14 +93,19 @@ absl::Status CheckSpeedScaling(const std::vector<arm::ArmState>& states) {
                    "arm, and touch again"));
 }
 
+// Controller time of a tick of the device, where both clocks are known.
+double ControllerTimeS(const TouchRecording& record, uint64_t ticks) {
+  const double device_s = static_cast<double>(ticks) / record.tick_hz;
+  return record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
+}
+
 // Controller times of the first and the last contact; none if there is no contact or no common time.
 std::optional<std::pair<double, double>> ContactSpan(const TouchRecording& record) {
   if (!record.controller_clock.valid || !record.effector_clock.valid) return std::nullopt;
   std::optional<std::pair<double, double>> span;
   for (const auto& ticks : record.contacts.contact_ticks) {
     if (!ticks.has_value()) continue;
-    const double device_s = static_cast<double>(*ticks) / record.tick_hz;
-    const double controller_s = record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
+    const double controller_s = ControllerTimeS(record, *ticks);
     if (!span.has_value()) span = {controller_s, controller_s};
     span->first = std::min(span->first, controller_s);
     span->second = std::max(span->second, controller_s);
@@ -173,6 +182,18 @@ double HostUncertaintyS(const timing::ClockEstimate& clock, double remote_s) {
   return std::hypot(clock.offset_uncertainty_s, clock.rate_uncertainty * age_s) / clock.rate;
 }
 
+// Whether the tool certainly still approached then, as far as both clocks and the arm's states tell.
+bool IsBeforeTheTurn(const TouchRecording& record, uint64_t ticks) {
+  const std::vector<arm::ArmState> states = ApproachStates(record);
+  if (states.empty() || !record.controller_clock.valid || !record.effector_clock.valid) return false;
+  const double controller_s = ControllerTimeS(record, ticks);
+  const double host_s = kSigmas * std::hypot(HostUncertaintyS(record.effector_clock,
+                                                              static_cast<double>(ticks) / record.tick_hz),
+                                             HostUncertaintyS(record.controller_clock, controller_s)) +
+                        kBusyHostS;
+  return controller_s < states.back().controller_time_s - host_s * record.controller_clock.rate;
+}
+
 // Contact times since the device's `began_device_s`, and poses at contact where `synchronised`. *moved_s: by how much
 // all of them were moved, since no contact comes before its approach.
 std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, double began_device_s,
@@ -187,8 +208,8 @@ std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, doub
       finger.ticks = *ticks;
       finger.contact_time_s = (device_s - began_device_s) / device_rate * record.time_scale;
       if (synchronised) {
-        const double controller_s = record.controller_clock.RemoteOf(record.effector_clock.HostOf(device_s));
-        if (const auto pose = PoseAt(record.states, controller_s, 0.1 * std::max(1.0, record.time_scale)))
+        if (const auto pose = PoseAt(record.states, ControllerTimeS(record, *ticks),
+                                     0.1 * std::max(1.0, record.time_scale)))
           finger.base_from_tip = geometry::PoseVectorOf(*pose);
       }
     }
@@ -206,6 +227,25 @@ std::vector<session::JournalFinger> FingersOf(const TouchRecording& record, doub
 }
 
 }  // namespace
+
+absl::Status CheckHeld(const TouchRecording& record) {
+  const effector::EffectorTouch& contacts = record.contacts;
+  uint64_t last_contact = 0;
+  for (const auto& ticks : contacts.contact_ticks) last_contact = std::max(last_contact, ticks.value_or(0));
+  for (size_t i = 0; i < contacts.release_ticks.size(); ++i) {
+    const std::optional<uint64_t>&contact = contacts.contact_ticks[i], &release = contacts.release_ticks[i];
+    if (!contact.has_value() || !release.has_value()) continue;
+    // The tool goes on until the last contact: that is certain by the device's clock alone.
+    if (*release >= last_contact && !IsBeforeTheTurn(record, *release)) continue;
+    const double held_s = static_cast<double>(*release - std::min(*contact, *release)) / record.tick_hz;
+    return absl::FailedPreconditionError(absl::StrCat(
+        effector::FingersText(1u << i), " let go ", ShortestNumber(std::round(1e4 * held_s) / 10),
+        " ms after it had reported a contact, while the tool still approached: it stuck before and freed "
+        "itself, or slid off an edge, so that ",
+        kMaybeNoContact));
+  }
+  return absl::OkStatus();
+}
 
 absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const Approach approach, ApproachOf(record));

@@ -35,6 +35,10 @@ absl::StatusOr<session::JournalResult> ResultOf(const TouchRecording& record);
 // finger sticks, and what it reported may be no contact.
 absl::Status CheckReleased(const effector::EffectorTouch& contacts);
 
+// Whether every finger that had contact stayed pressed until the tool turned back. FAILED_PRECONDITION names one that did
+// not. After the last contact that is known only with a common time and states of the approach; OK without.
+absl::Status CheckHeld(const TouchRecording& record);
+
 // base_from_tip between the two states round a controller time; nothing if they do not enclose it within
 // 0.1 rig s.
 std::optional<Eigen::Isometry3d> PoseAt(const std::vector<arm::ArmState>& states, double controller_s,

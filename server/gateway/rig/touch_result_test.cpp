@@ -126,6 +126,36 @@ TEST(TouchResult, AFingerThatReportedNothingHasNeitherTimeNorPose) {
   EXPECT_NEAR(result->fingers[2].contact_time_s, 1.3, 2e-6);
 }
 
+// Of contacts after 1.2, 1.25 and 1.3 s of an approach that turns back after 4 s; the second finger let go at_s.
+TouchRecording LetGo(double at_s) {
+  Made made({{1.2}, {1.25}, {1.3}});
+  made.record.contacts.release_ticks = Made({std::nullopt, {at_s}, {4.02}}).record.contacts.contact_ticks;
+  return made.record;
+}
+
+TEST(TouchResult, AFingerThatLetGoBeforeTheToolTurnedBackIsNamed) {
+  EXPECT_TRUE(CheckHeld(LetGo(4)).ok()) << CheckHeld(LetGo(4));
+  const absl::Status refused = CheckHeld(LetGo(1.5));
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(
+      std::string(refused.message()),
+      testing::HasSubstr("finger 2 let go 250 ms after it had reported a contact, while the tool still "
+                         "approached"));
+}
+
+TEST(TouchResult, ThatAFingerLetGoTooEarlyIsClaimedOnlyIfItIsCertain) {
+  TouchRecording record = LetGo(3.9);
+  EXPECT_FALSE(CheckHeld(record).ok());
+  record.effector_clock.offset_uncertainty_s = 0.05;
+  EXPECT_TRUE(CheckHeld(record).ok());
+  // Before the last contact it is certain whatever the clocks are.
+  record = LetGo(1.29);
+  record.effector_clock.valid = record.controller_clock.valid = false;
+  EXPECT_FALSE(CheckHeld(record).ok());
+  record.contacts.contact_ticks[1].reset();
+  EXPECT_TRUE(CheckHeld(record).ok()) << "it had no contact";
+}
+
 TEST(TouchResult, ASpeedSliderOrALimiterBelowFullIsRefusedWithBothNumbers) {
   for (const auto& [slider, limiter] : {std::pair(0.5, 1.0), std::pair(1.0, 0.5), std::pair(0.9, 0.8)}) {
     const auto result = ResultOf(Made({{1.2}, {1.0}, {1.3}}, Scaling{slider, limiter}).record);

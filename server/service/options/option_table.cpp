@@ -21,16 +21,22 @@
 #include <cassert>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
+#include <optional>
 
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/version.h"
+#include "server/base/whole_number.h"
 #include "server/service/options/man_page.h"
 
 namespace touchstone::service {
 namespace {
+
+constexpr int kMaxWhole = std::numeric_limits<int>::max(), kMinWhole = -kMaxWhole;
 
 template <typename Value, typename Read>
 absl::Status AssignList(const toml::node& node, const std::string& where, const char* expected,
@@ -52,8 +58,11 @@ absl::Status Assign(const toml::node& node, const std::string& where, const Opti
     if (!node.is_string()) return wrong("a text in quotes");
     **text = *node.value<std::string>();
   } else if (auto* whole = std::get_if<int*>(&target)) {
-    const auto value = node.value_exact<int64_t>();
-    if (!value || *value < INT32_MIN || *value > INT32_MAX) return wrong("a whole number");
+    // TOML takes 1e6 for a fraction's type; whoever writes a count so means the whole number.
+    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
+    if (!value || *value != std::floor(*value)) return wrong("a whole number");
+    if (*value < kMinWhole || *value > kMaxWhole)
+      return wrong(absl::StrCat("a whole number from ", kMinWhole, " to ", kMaxWhole).c_str());
     **whole = static_cast<int>(*value);
   } else if (auto* real = std::get_if<double*>(&target)) {
     if (!node.is_number()) return wrong("a number");
@@ -79,6 +88,18 @@ absl::Status Assign(const toml::node& node, const std::string& where, const Opti
                       });
   }
   return absl::OkStatus();
+}
+
+// Of a flag that is a whole number, which may be below 0; written as CLI11 reads it. Says what is wrong, or nothing.
+std::string CheckInt(std::string& text) {
+  const bool negative = !text.empty() && text[0] == '-';
+  const absl::StatusOr<uint64_t> size = ParseWholeNumber(absl::string_view(text).substr(negative ? 1 : 0));
+  if (!size.ok() && !absl::IsOutOfRange(size.status()))
+    return absl::StrCat("'", text, "' is no whole number; one like 1000, 1_000 or 1e3 was expected");
+  if (!size.ok() || *size > static_cast<uint64_t>(kMaxWhole))
+    return absl::StrCat("'", text, "' is out of range; at least ", kMinWhole, ", at most ", kMaxWhole);
+  text = absl::StrCat(negative ? "-" : "", *size);
+  return "";
 }
 
 std::string FlagOfKey(const std::string& key) {
@@ -152,6 +173,10 @@ void AddFlags(const std::vector<Option>& options, CLI::App* app) {
             app->add_option(FlagNames(option), *target, option.meaning)->allow_extra_args(false);
           } else if constexpr (std::is_same_v<Value, std::vector<double>>) {
             app->add_option(FlagNames(option), *target, option.meaning)->delimiter(',');
+          } else if constexpr (std::is_same_v<Value, int>) {
+            app->add_option(FlagNames(option), *target, option.meaning)
+                ->capture_default_str()
+                ->transform(CLI::Validator(CheckInt, ""));
           } else {
             app->add_option(FlagNames(option), *target, option.meaning)->capture_default_str();
           }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 
 #include "server/service/options/option_table.h"
 #include "server/service/rpc/server_flags.h"
@@ -56,6 +57,43 @@ TEST(ServerFlags, EveryMistakeNamesItsPlace) {
   const char* arguments[] = {"touchstone-server", "--treads", "3"};
   EXPECT_THAT(std::string(ParseServerFlags(3, arguments).status().message()),
               HasSubstr("did you mean '--threads'"));
+}
+
+TEST(ServerFlags, CountsAreReadAsPeopleWriteThem) {
+  for (const char* text : {"1000000", "1_000_000", "1e6", "1E+6", "0.1e7", "0001000000"}) {
+    const char* arguments[] = {"touchstone-server", "--max-session-touches", text};
+    const auto flags = ParseServerFlags(3, arguments);
+    ASSERT_TRUE(flags.ok()) << text << ": " << flags.status();
+    EXPECT_EQ(flags->options.max_session_touches, 1'000'000) << text;
+  }
+  for (const char* text : {"1000000", "1_000_000", "1e6", "1E+6", "0.1e7"}) {
+    ServerFlags flags;
+    const absl::Status read = ApplyToml(absl::StrCat("max_session_touches = ", text), "server.toml", &flags);
+    ASSERT_TRUE(read.ok()) << text << ": " << read;
+    EXPECT_EQ(flags.options.max_session_touches, 1'000'000) << text;
+  }
+  const char* any_device[] = {"touchstone-server", "--egl-device", "-1"};
+  EXPECT_EQ(ParseServerFlags(3, any_device)->options.renderer.egl_device, -1);
+}
+
+TEST(ServerFlags, WhatIsNoCountIsRefusedAsItWasSent) {
+  for (const auto& [text, complaint] :
+       std::map<const char*, const char*>{{"1.5", "'1.5' is no whole number"},
+                                          {"-ten", "'-ten' is no whole number"},
+                                          {"0x10", "'0x10' is no whole"},
+                                          {"1e10", "'1e10' is out of range"},
+                                          {"-1e99", "'-1e99' is out of range"}}) {
+    const char* arguments[] = {"touchstone-server", "--max-session-touches", text};
+    EXPECT_THAT(std::string(ParseServerFlags(3, arguments).status().message()),
+                testing::AllOf(HasSubstr("--max-session-touches"), HasSubstr(complaint)));
+  }
+  ServerFlags flags;
+  EXPECT_THAT(std::string(ApplyToml("threads = 1.5\n", "server.toml", &flags).message()),
+              HasSubstr("whole number"));
+  for (const char* text : {"1e10", "-1e300", "nan", "inf", "9223372036854775807"})
+    EXPECT_THAT(std::string(ApplyToml(absl::StrCat("threads = ", text), "server.toml", &flags).message()),
+                HasSubstr("whole number"))
+        << text;
 }
 
 // What the parser's library took for granted.

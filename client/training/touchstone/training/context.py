@@ -13,6 +13,7 @@ from typing import Any, Callable
 import numpy as np
 
 import touchstone
+from touchstone.whole_file import whole_file
 
 from . import plans
 from .emulated_rig import EmulatedRig
@@ -91,9 +92,8 @@ class Context:
         if not path.exists():
             made = make()
             path.parent.mkdir(parents=True, exist_ok=True)
-            part = path.with_suffix(".part.npz")
-            np.savez_compressed(part, **made)
-            part.replace(path)
+            with whole_file(path, "wb") as file:
+                np.savez_compressed(file, **made)
         with np.load(path) as found:
             return dict(found)
 

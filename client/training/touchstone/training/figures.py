@@ -11,6 +11,8 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from touchstone.whole_file import whole_file
+
 from .result import Estimate, Figure
 
 # Okabe and Ito: the colour-blind can tell them apart. One colour a thing, in every figure.
@@ -41,7 +43,8 @@ def colour(name: str, place: int = 0) -> str:
 def save(figure: plt.Figure, path: pathlib.Path, caption: str) -> Figure:
     """Writes and closes it. `path`: of Context.figure_path()."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, metadata={"Date": None})
+    with whole_file(path, "wb") as file:
+        figure.savefig(file, format="svg", metadata={"Date": None})
     plt.close(figure)
     return Figure(f"{path.parent.name}/{path.name}", caption)
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 import touchstone
+from touchstone.whole_file import whole_file
 
 from .context import Context
 from .features import Features, FeatureSets, curvatures, dealt_sets
@@ -103,9 +104,8 @@ def climb(context: Context, rig: HiddenRig = RIGS[0]) -> list[Rung]:
     report = context.simulator.diagnose(folder / "diagnosed.csv", NOMINAL, seed=1)
     rungs = [Rung(name, model, context.simulator.compare(folder / "held_out.csv", model).rmse_us)
              for name, model in models(report)]
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps([dataclasses.asdict(rung) for rung in rungs], indent=1))
-    part.replace(path)
+    with whole_file(path) as file:
+        json.dump([dataclasses.asdict(rung) for rung in rungs], file, indent=1)
     return rungs
 
 

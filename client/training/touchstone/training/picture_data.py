@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 
 import touchstone
+from touchstone.whole_file import whole_file
 
 from . import plans
 from .backbone import Backbone
@@ -179,9 +180,8 @@ class FeatureCache:
             found = self.backbone.features(image)
             self.pictures, self.seconds = self.pictures + len(image), self.seconds + time.monotonic() - begin
             self._folder.mkdir(parents=True, exist_ok=True)
-            part = path.with_suffix(".part.npy")
-            np.save(part, found)
-            part.replace(path)
+            with whole_file(path, "wb") as file:
+                np.save(file, found)
         return np.load(path)
 
     def rate(self) -> str:

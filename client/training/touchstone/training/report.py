@@ -11,6 +11,8 @@ import platform
 import re
 from collections.abc import Sequence
 
+from touchstone.whole_file import whole_file
+
 from .experiment import Experiment
 from .result import Result
 from .settings import Settings
@@ -38,10 +40,12 @@ def write(settings: Settings, done: Sequence[tuple[Experiment, Result]], left_ou
     if left_out:
         page += ["<h2>Left out</h2>", "<ul>", *(f"<li>{_text(each.title)}: {_text(why)}</li>" for each, why in left_out), "</ul>"]
     path = settings.out / "report.html"
-    path.write_text("\n".join(page) + "\n", encoding="utf-8")
+    with whole_file(path, encoding="utf-8") as file:
+        file.write("\n".join(page) + "\n")
     found = {"about": about, "command": command, "date": date, "left_out": {e.name: why for e, why in left_out},
              "experiments": [{**dataclasses.asdict(result), "seed_shows": e.seed_shows} for e, result in done]}
-    (settings.out / "report.json").write_text(json.dumps(_without_nan(found), indent=1) + "\n")
+    with whole_file(settings.out / "report.json") as file:
+        file.write(json.dumps(_without_nan(found), indent=1) + "\n")
     return path
 
 

@@ -7,6 +7,8 @@ import json
 import pathlib
 from typing import Any
 
+from touchstone.whole_file import whole_file
+
 
 @dataclasses.dataclass
 class Estimate:
@@ -78,9 +80,8 @@ class Result:
 
     def save(self, path: pathlib.Path, digest: str) -> None:
         """Whole or not at all, with the digest of what it was made by."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps({"digest": digest, **dataclasses.asdict(self)}, indent=1))
-        part.replace(path)
+        with whole_file(path) as file:
+            json.dump({"digest": digest, **dataclasses.asdict(self)}, file, indent=1)
 
     @classmethod
     def load(cls, path: pathlib.Path, digest: str) -> Result | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import touchstone
+from touchstone.whole_file import whole_file
 
 from .separation import command_numbers
 
@@ -65,11 +66,10 @@ class TouchData:
 
     def save(self, path: pathlib.Path) -> None:
         """Whole or not at all."""
-        part = path.with_suffix(".part.npz")
         image = {} if self.image is None else {"image": self.image}
-        np.savez_compressed(part, objects=np.array(self.objects), hand=[self.speed_mm_s, self.spacing_mm], **image,
-                            **{name: getattr(self, name) for name in _ARRAYS})
-        part.replace(path)
+        with whole_file(path, "wb") as file:
+            np.savez_compressed(file, objects=np.array(self.objects), hand=[self.speed_mm_s, self.spacing_mm], **image,
+                                **{name: getattr(self, name) for name in _ARRAYS})
 
     @classmethod
     def load(cls, path: pathlib.Path) -> TouchData:

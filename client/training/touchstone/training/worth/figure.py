@@ -8,6 +8,8 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
+from touchstone.whole_file import whole_file
+
 from .. import figures
 from ..result import Estimate
 from .result import Worth
@@ -22,7 +24,8 @@ def draw(worth: Worth, path: str | os.PathLike[str]) -> None:
     for axes in (left, right):
         axes.set_ylim(100 * max(0, min(_chance(worth), *(each.low for each in shown)) - 0.05), 102)
     target = pathlib.Path(path)
-    figure.savefig(target, metadata={"Date": None} if target.suffix == ".svg" else None)
+    with whole_file(target, "wb") as file:
+        figure.savefig(file, format=target.suffix[1:] or None, metadata={"Date": None} if target.suffix == ".svg" else None)
     plt.close(figure)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import touchstone
+from touchstone.whole_file import whole_file
 
 from ..touch_data import TouchData
 
@@ -80,7 +81,7 @@ def _copy_rows(source: pathlib.Path, to: pathlib.Path, keep: np.ndarray) -> None
     """Those rows of a measurement file, with all columns."""
     with source.open(newline="", encoding="utf-8") as file:
         header, *rows = (row for row in csv.reader(file) if row)
-    with to.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(to, newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([header, *(row for row, kept in zip(rows, keep) if kept)])
 
 

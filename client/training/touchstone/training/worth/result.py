@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from touchstone.tabular import Tabular
+from touchstone.whole_file import whole_file
 
 from .. import ladder_words
 from ..ladder import Rung
@@ -119,8 +120,8 @@ class Worth(Tabular):
         return plain
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as JSON."""
-        with open(path, "w", encoding="utf-8") as file:
+        """Writes it as JSON, whole or not at all."""
+        with whole_file(path, encoding="utf-8") as file:
             file.write(json.dumps(self.to_dict(), indent=1) + "\n")
 
     def text(self, width: int = 100) -> str:

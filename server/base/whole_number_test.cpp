@@ -1,9 +1,9 @@
-#include "client/cli/common/whole_number.h"
+#include "server/base/whole_number.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace touchstone::cli {
+namespace touchstone {
 namespace {
 
 using ::testing::HasSubstr;
@@ -35,4 +35,4 @@ TEST(WholeNumber, IsNotLargerThanItsType) {
 }
 
 }  // namespace
-}  // namespace touchstone::cli
+}  // namespace touchstone

@@ -1,4 +1,4 @@
-#include "client/cli/common/whole_number.h"
+#include "server/base/whole_number.h"
 
 #include <limits>
 
@@ -6,7 +6,7 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
-namespace touchstone::cli {
+namespace touchstone {
 namespace {
 
 constexpr int kMaxExponent = 19;  // 10^20 is above 2^64
@@ -37,7 +37,7 @@ std::string WithoutSeparators(absl::string_view text) {
 absl::StatusOr<uint64_t> ParseWholeNumber(absl::string_view text) {
   const absl::Status wrong = absl::InvalidArgumentError(
       absl::StrCat("'", text, "' is no whole number from 0 on; one like 1000, 1_000 or 1e3 was expected"));
-  const absl::Status too_large = absl::InvalidArgumentError(
+  const absl::Status too_large = absl::OutOfRangeError(
       absl::StrCat("'", text, "' is too large; at most ", std::numeric_limits<uint64_t>::max()));
   std::string digits = WithoutSeparators(text);
   int exponent = 0;
@@ -62,4 +62,4 @@ absl::StatusOr<uint64_t> ParseWholeNumber(absl::string_view text) {
   return value;
 }
 
-}  // namespace touchstone::cli
+}  // namespace touchstone
