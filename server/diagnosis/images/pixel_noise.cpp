@@ -111,14 +111,14 @@ float RecordTable::Mean(float grey) const {
   return mean_[below] + (place - static_cast<float>(below)) * (mean_[below + 1] - mean_[below]);
 }
 
-void RecordTable::ToMeans(std::vector<float>* grey) const {
+void RecordTable::ToMeans(float* grey, size_t size) const {
   // A diagnosis does this for every pixel that it expects, and most of them are grey levels that no clipping changes
   // (interpolating gives them back exactly), or a ground that is the same everywhere.
   float ground = std::numeric_limits<float>::quiet_NaN(), ground_mean = 0;
   const float first = first_kept_grey_, last = last_kept_grey_;
-  for (size_t begin = 0; begin < grey->size(); begin += kBlock) {
-    float* const values = grey->data() + begin;
-    const int count = static_cast<int>(std::min<size_t>(kBlock, grey->size() - begin));
+  for (size_t begin = 0; begin < size; begin += kBlock) {
+    float* const values = grey + begin;
+    const int count = static_cast<int>(std::min<size_t>(kBlock, size - begin));
     const Eigen::Map<const Eigen::ArrayXf> block(values, count);
     const float lowest = block.minCoeff(), highest = block.maxCoeff();
     if (lowest >= first && highest <= last) continue;

@@ -1,6 +1,7 @@
 // How much single pixels scatter, as images themselves show it: from what neighbouring pixels differ by.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace touchstone::diagnosis::images {
@@ -25,8 +26,9 @@ class RecordTable {
  public:
   explicit RecordTable(const PixelNoise& noise);
   float Mean(float grey) const;
-  // The same of a whole picture, in place.
-  void ToMeans(std::vector<float>* grey) const;
+  // The same of many pixels, in place.
+  void ToMeans(float* grey, size_t count) const;
+  void ToMeans(std::vector<float>* grey) const { ToMeans(grey->data(), grey->size()); }
   // Of a pixel that records `mean` on average.
   double Variance(double mean) const { return At(variance_, mean); }
   double Clipped(double mean) const { return At(clipped_, mean); }
