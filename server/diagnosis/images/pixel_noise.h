@@ -42,6 +42,14 @@ class RecordTable {
   std::vector<float> variance_, clipped_;  // by what is recorded on average
 };
 
+// The scatter at one grey level.
+struct LevelScatter {
+  double grey = 0, variance = 0;
+  double count = 0;  // of differences
+};
+inline constexpr double kTrimmedEfficiency =
+    0.35;  // of such a difference, which is trimmed and shares pixels, as a degree of freedom
+
 // Gathers second differences of images along their rows, by grey level.
 class NoiseGatherer {
  public:
@@ -54,6 +62,8 @@ class NoiseGatherer {
 
   // The noise of the smoother four fifths of the pixels: edges and texture take no part, where they are fewer.
   PixelNoise Estimate() const;
+  // By grey level, where enough differences are; of levels that clipping hardly touches, or of the one that it touches least.
+  std::vector<LevelScatter> Levels() const;
   double count() const;
 
  private:
