@@ -16,6 +16,8 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr int kQuarters = 4;
+constexpr double kContourGrey = 20;  // of a step, from which it is no shade of a curved surface
+constexpr double kMaxCut = 0.001;    // of a pixel's records
 constexpr double kMinDegrees = 200;  // that a part needs
 constexpr size_t kPartsSaid = 6;     // more of them: the least and the most noisy
 constexpr double kHalfBinGrey = 8;   // of NoiseGatherer's grey levels
@@ -77,7 +79,8 @@ class UnevenNoiseSearch {
         const std::vector<float> contours = ContourSquares(expected_[k].grey, p_.width(), p_.height());
         for (size_t i = 0; i < contours.size(); ++i) {
           judged.residual[i] -= expected_[k].grey[i];
-          if (contours[i] > 0) judged.level[i] = 0;
+          if (contours[i] > kContourGrey * kContourGrey || p_.record->Clipped(expected_[k].grey[i]) > kMaxCut)
+            judged.level[i] = 0;
         }
         of_picture_[k].Add(judged.residual, judged.level, p_.width(), p_.height(), 1);
       }

@@ -19,7 +19,7 @@ using MoreNoise = std::function<double(int photograph, int column, double grey)>
 DiagnosisInput InputWithMoreNoise(const MoreNoise& more) {
   HiddenCamera rig;
   rig.photographs = 6;
-  rig.side_px = 112;
+  rig.side_px = 224;
   auto random = std::make_shared<RandomStream>(7, RandomDomain::kTest);
   if (more)
     rig.unlisted = [=](int photograph, int column, int, const image::Photo& photo, size_t pixel) {
@@ -51,8 +51,8 @@ TEST(UnevenNoise, IsFoundOfOneObjectOneStretchOneSideAndARangeOfGreyLevels) {
     return found ? found->test.name : "";
   };
   EXPECT_EQ(covariate([](int k, int, double) { return k == 4 ? 5 : 0; }), "image");
-  EXPECT_EQ(covariate([](int, int column, double) { return column > 56 ? 5 : 0; }), "column");
-  EXPECT_EQ(covariate([](int, int, double grey) { return grey > 60 && grey < 110 ? 5 : 0; }), "grey");
+  EXPECT_EQ(covariate([](int, int column, double) { return column > 112 ? 5 : 0; }), "column");
+  EXPECT_EQ(covariate([](int, int, double grey) { return grey > 120 ? 6 : 0; }), "grey");
 }
 
 TEST(UnevenNoise, OfALatePartOfTheSessionIsUnexplained) {
