@@ -143,12 +143,19 @@ void CollectPixels(Visibility* visibility, int width, PhotoPoints* points) {
   for (int row = box.first_row; row < box.last_row; ++row) {
     const uint32_t* const seen = visibility->Row(row);
     const int first_pixel = row * width + box.first_column;
+    const size_t before = count;
     for (int i = 0; i < columns; ++i) {
       // Always written, counted only if there is a triangle.
       points->pixel[count] = first_pixel + i;
       points->triangle[count] = seen[i];
       count += seen[i] != geometry::kNoTriangle;
     }
+    if (count == before) continue;
+    PixelBox& seen_box = points->box;
+    if (before == 0) seen_box = {width, row, 0, row};
+    seen_box.first_column = std::min(seen_box.first_column, points->pixel[before] - row * width);
+    seen_box.last_column = std::max(seen_box.last_column, points->pixel[count - 1] - row * width + 1);
+    seen_box.last_row = row + 1;
   }
   points->pixel.resize(count);
   points->triangle.resize(count);
@@ -254,6 +261,7 @@ void FindPoints(const geometry::Surface& surface, const ShadingMesh& mesh, const
   const CpuFrame frame = MakePhotoFrame(surface, mesh, camera, lens, slopes);
   points->pixel.clear();
   points->triangle.clear();
+  points->box = PixelBox();
   if (frame.box.first_row < frame.box.last_row) {
     Visibility visibility(frame.box);
     // Straight edges stay straight without distortion: then triangles can be drawn.

@@ -39,6 +39,7 @@ PhotoCamera RealCamera(const Camera& commanded, const effects::PhotoSettings& se
 // The pixels that see the surface, row by row, an entry each.
 struct PhotoPoints {
   int count = 0;
+  PixelBox box;                    // that just holds them; empty where there are none
   std::vector<int> pixel;          // row * width + column
   std::vector<uint32_t> triangle;  // that is seen
   std::array<std::vector<float>, 3> point_m;

@@ -6,6 +6,7 @@
 #include <absl/strings/str_format.h>
 
 #include "server/base/random.h"
+#include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/image/photo_power.h"
 
@@ -14,22 +15,6 @@ namespace {
 
 constexpr double kFloatGrey = 255.0;
 constexpr double kGaussianReach = 5.0;  // in sigmas: the rest is 6e-7
-
-void Vignette(double strength, const PhotoLens& lens, std::vector<float>* light) {
-  const double half_diagonal_px = 0.5 * std::hypot(lens.width, lens.height);
-  const float scale = static_cast<float>(1.0 / half_diagonal_px);
-  const float cx = static_cast<float>(lens.cx), cy = static_cast<float>(lens.cy);
-  const float lost = static_cast<float>(strength);
-  for (int row = 0; row < lens.height; ++row) {
-    const float y = (row + 0.5f - cy) * scale;
-    float* const line = &(*light)[static_cast<size_t>(row) * lens.width];
-    for (int column = 0; column < lens.width; ++column) {
-      const float x = (column + 0.5f - cx) * scale;
-      const float left = 1.0f - lost * (x * x + y * y);
-      line[column] *= left > 0.0f ? left : 0.0f;
-    }
-  }
-}
 
 std::vector<float> GaussianWeights(double sigma_px) {
   const int reach = static_cast<int>(std::ceil(kGaussianReach * sigma_px));
@@ -44,23 +29,59 @@ std::vector<float> GaussianWeights(double sigma_px) {
   return result;
 }
 
-// A picture with its border repeated outwards, so that taps need no checks.
-struct Padded {
-  int reach, stride;
-  std::vector<float> values;
-  const float* At(int row, int column) const {
-    return &values[static_cast<size_t>(row + reach) * stride + column + reach];
+// What is worked on of a picture: outside the box its light is the ground's, whose records are worked out once.
+struct Part {
+  int width = 0, height = 0;  // of the picture
+  PixelBox box;
+  std::vector<float>* light;
+
+  int columns() const { return box.last_column - box.first_column; }
+  float* Row(int row) const { return &(*light)[static_cast<size_t>(row) * width + box.first_column]; }
+  template <typename Act>
+  void ForRows(const Act& act) const {  // act(values, count)
+    for (int row = box.first_row; row < box.last_row; ++row) act(Row(row), columns());
   }
 };
-Padded Pad(const std::vector<float>& light, int width, int height, int reach) {
-  Padded padded{reach, width + 2 * reach, {}};
-  padded.values.resize(static_cast<size_t>(padded.stride) * (height + 2 * reach));
-  for (int row = -reach; row < height + reach; ++row) {
-    const float* const from = &light[static_cast<size_t>(std::clamp(row, 0, height - 1)) * width];
-    float* const to = &padded.values[static_cast<size_t>(row + reach) * padded.stride];
-    std::fill_n(to, reach, from[0]);
-    std::copy_n(from, width, to + reach);
-    std::fill_n(to + reach + width, reach, from[width - 1]);
+
+void Vignette(double strength, const PhotoLens& lens, const Part& part) {
+  const double half_diagonal_px = 0.5 * std::hypot(lens.width, lens.height);
+  const float scale = static_cast<float>(1.0 / half_diagonal_px);
+  const float cx = static_cast<float>(lens.cx), cy = static_cast<float>(lens.cy);
+  const float lost = static_cast<float>(strength);
+  for (int row = part.box.first_row; row < part.box.last_row; ++row) {
+    const float y = (row + 0.5f - cy) * scale;
+    float* const line = &(*part.light)[static_cast<size_t>(row) * lens.width];
+    for (int column = part.box.first_column; column < part.box.last_column; ++column) {
+      const float x = (column + 0.5f - cx) * scale;
+      const float left = 1.0f - lost * (x * x + y * y);
+      line[column] *= left > 0.0f ? left : 0.0f;
+    }
+  }
+}
+
+// The part with a border of `reach` more, the picture's own border repeated outwards, so that taps need no checks.
+struct Padded {
+  int reach, stride;
+  PixelBox box;
+  std::vector<float> values;
+  const float* At(int row, int column) const {
+    return &values[static_cast<size_t>(row - box.first_row + reach) * stride + column - box.first_column +
+                   reach];
+  }
+};
+Padded Pad(const Part& part, int reach) {
+  const PixelBox& box = part.box;
+  const int first = box.first_column - reach, last = box.last_column + reach;
+  const int before = std::max(0, -first), after = std::max(0, last - part.width);
+  Padded padded{reach, last - first, box, {}};
+  padded.values.resize(static_cast<size_t>(padded.stride) * (box.last_row - box.first_row + 2 * reach));
+  float* to = padded.values.data();
+  for (int row = box.first_row - reach; row < box.last_row + reach; ++row, to += padded.stride) {
+    const float* const from =
+        &(*part.light)[static_cast<size_t>(std::clamp(row, 0, part.height - 1)) * part.width];
+    std::fill_n(to, before, from[0]);
+    std::copy_n(from + first + before, padded.stride - before - after, to + before);
+    std::fill_n(to + padded.stride - after, after, from[part.width - 1]);
   }
   return padded;
 }
@@ -69,52 +90,54 @@ void AddScaled(const float* from, float weight, int count, float* to) {
   for (int i = 0; i < count; ++i) to[i] += weight * from[i];
 }
 
-void Defocus(double sigma_px, const PhotoLens& lens, std::vector<float>* light) {
-  const std::vector<float> weights = GaussianWeights(sigma_px);
+void Defocus(const std::vector<float>& weights, const Part& part) {
   const int reach = static_cast<int>(weights.size()) - 1;
-  if (reach == 0) return;
-  const int width = lens.width, height = lens.height;
-  const Padded padded = Pad(*light, width, height, reach);
+  if (reach <= 0) return;
+  const int columns = part.columns(), first = part.box.first_column;
+  const Padded padded = Pad(part, reach);
   // Down the columns, then along the rows.
   std::vector<float> line(padded.stride);
-  for (int row = 0; row < height; ++row) {
+  for (int row = part.box.first_row; row < part.box.last_row; ++row) {
     std::fill(line.begin(), line.end(), 0.0f);
     for (int i = -reach; i <= reach; ++i)
-      AddScaled(padded.At(row + i, -reach), weights[std::abs(i)], padded.stride, line.data());
-    float* const result = &(*light)[static_cast<size_t>(row) * width];
-    std::fill_n(result, width, 0.0f);
+      AddScaled(padded.At(row + i, first - reach), weights[std::abs(i)], padded.stride, line.data());
+    float* const result = part.Row(row);
+    std::fill_n(result, columns, 0.0f);
     for (int i = -reach; i <= reach; ++i)
-      AddScaled(line.data() + reach + i, weights[std::abs(i)], width, result);
+      AddScaled(line.data() + reach + i, weights[std::abs(i)], columns, result);
   }
 }
 
-void MoveDuringExposure(double length_px, double angle_rad, const PhotoLens& lens,
-                        std::vector<float>* light) {
-  const std::vector<MotionTap> taps = MotionKernel(length_px, angle_rad);
+int ReachOf(const std::vector<MotionTap>& taps) {
   int reach = 0;
   for (const MotionTap& tap : taps) reach = std::max({reach, std::abs(tap.right), std::abs(tap.down)});
-  if (reach == 0) return;
-  const Padded padded = Pad(*light, lens.width, lens.height, reach);
-  std::fill(light->begin(), light->end(), 0.0f);
-  for (int row = 0; row < lens.height; ++row)
-    for (const MotionTap& tap : taps)
-      AddScaled(padded.At(row + tap.down, tap.right), tap.weight, lens.width,
-                &(*light)[static_cast<size_t>(row) * lens.width]);
+  return reach;
 }
 
-void ExposeAndRespond(double exposure_factor, double gamma, std::vector<float>* light) {
+void MoveDuringExposure(const std::vector<MotionTap>& taps, const Part& part) {
+  const int reach = ReachOf(taps);
+  if (reach == 0) return;
+  const Padded padded = Pad(part, reach);
+  for (int row = part.box.first_row; row < part.box.last_row; ++row) {
+    float* const result = part.Row(row);
+    std::fill_n(result, part.columns(), 0.0f);
+    for (const MotionTap& tap : taps)
+      AddScaled(padded.At(row + tap.down, part.box.first_column + tap.right), tap.weight, part.columns(),
+                result);
+  }
+}
+
+void ExposeAndRespond(double exposure_factor, double gamma, float* values, int count) {
   const float factor = static_cast<float>(exposure_factor), white = static_cast<float>(kFloatGrey);
-  float* const values = light->data();
-  const size_t count = light->size();
   if (gamma == 1) {
-    for (size_t i = 0; i < count; ++i) {
+    for (int i = 0; i < count; ++i) {
       const float exposed = values[i] * factor;
       values[i] = white * (exposed < 1.0f ? exposed : 1.0f);
     }
     return;
   }
   const float exponent = static_cast<float>(gamma);
-  for (size_t i = 0; i < count; ++i) {
+  for (int i = 0; i < count; ++i) {
     const float exposed = values[i] * factor;
     values[i] = white * PowerOf(exposed < 1.0f ? exposed : 1.0f, exponent);
   }
@@ -125,14 +148,26 @@ float SrgbOf(float light) {
 }
 
 // sRGB's curve, or a mean of it and none, of recorded grey levels.
-void WriteSrgb(double share, std::vector<float>* grey) {
+void WriteSrgb(double share, float* values, int count) {
   const float white = static_cast<float>(kFloatGrey), part = static_cast<float>(share);
-  for (float& value : *grey) value += part * (white * SrgbOf(value / white) - value);
+  for (int i = 0; i < count; ++i) values[i] += part * (white * SrgbOf(values[i] / white) - values[i]);
 }
 
-void AddPedestal(double black_level_grey, std::vector<float>* grey) {
+void AddPedestal(double black_level_grey, float* values, int count) {
   const float white = static_cast<float>(kFloatGrey), pedestal = static_cast<float>(black_level_grey);
-  for (float& value : *grey) value = std::min(value + pedestal, white);
+  for (int i = 0; i < count; ++i) values[i] = std::min(values[i] + pedestal, white);
+}
+
+// Of a part whose vignetting is done.
+void BlurAndRespond(const effects::PhotoSettings& settings, const std::vector<float>& defocus,
+                    const std::vector<MotionTap>& motion, const Part& part) {
+  Defocus(defocus, part);
+  MoveDuringExposure(motion, part);
+  part.ForRows([&](float* values, int count) {
+    ExposeAndRespond(settings.exposure_factor, settings.gamma, values, count);
+    if (settings.srgb_share > 0) WriteSrgb(settings.srgb_share, values, count);
+    if (settings.black_level_grey > 0) AddPedestal(settings.black_level_grey, values, count);
+  });
 }
 
 absl::Status AddTerms(const effects::PhotoSettings& settings, const PhotoLens& lens,
@@ -202,17 +237,32 @@ std::vector<MotionTap> MotionKernel(double length_px, double angle_rad) {
   return taps;
 }
 
-absl::Status RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens,
-                         const PixelSurface& surface, double session_time_s, std::vector<float>* light) {
-  if (settings.vignetting != 0) Vignette(settings.vignetting, lens, light);
-  if (settings.defocus_sigma_px > 0) Defocus(settings.defocus_sigma_px, lens, light);
+absl::StatusOr<PixelBox> RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens,
+                                     const PixelSurface& surface, double session_time_s,
+                                     const PixelBox& object, std::vector<float>* light) {
+  std::vector<float> defocus;
+  if (settings.defocus_sigma_px > 0) defocus = GaussianWeights(settings.defocus_sigma_px);
+  std::vector<MotionTap> motion;
   if (settings.motion_length_px > 0)
-    MoveDuringExposure(settings.motion_length_px, settings.motion_angle_rad, lens, light);
-  ExposeAndRespond(settings.exposure_factor, settings.gamma, light);
-  if (settings.srgb_share > 0) WriteSrgb(settings.srgb_share, light);
-  if (settings.black_level_grey > 0) AddPedestal(settings.black_level_grey, light);
-  if (settings.added_grey.empty()) return absl::OkStatus();
-  return AddTerms(settings, lens, surface, session_time_s, light);
+    motion = MotionKernel(settings.motion_length_px, settings.motion_angle_rad);
+  const float ground = static_cast<float>(settings.background_light);
+  Part part{lens.width, lens.height, {0, 0, lens.width, lens.height}, light};
+  // Most pixels of a picture see the ground. It differs from place to place where light falls off towards the corners,
+  // unless it is black.
+  if (settings.vignetting == 0 || ground == 0) {
+    const int reach = std::max(static_cast<int>(defocus.size()) - 1, 0) + ReachOf(motion);
+    part.box = {std::max(object.first_column - reach, 0), std::max(object.first_row - reach, 0),
+                std::min(object.last_column + reach, lens.width),
+                std::min(object.last_row + reach, lens.height)};
+  }
+  if (settings.vignetting != 0) Vignette(settings.vignetting, lens, part);
+  BlurAndRespond(settings, defocus, motion, part);
+  std::vector<float> one = {ground};
+  BlurAndRespond(settings, defocus, motion, {1, 1, {0, 0, 1, 1}, &one});
+  if (one[0] != ground) FillAround(part.box, one[0], lens.width, light);
+  if (settings.added_grey.empty()) return part.box;
+  TOUCHSTONE_RETURN_IF_ERROR(AddTerms(settings, lens, surface, session_time_s, light));
+  return PixelBox{0, 0, lens.width, lens.height};
 }
 
 void DrawPixels(const effects::PhotoSettings& settings, const std::vector<float>& grey, uint64_t seed,

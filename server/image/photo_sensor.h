@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
-#include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include "server/effects/photo_settings.h"
 #include "server/image/photo_lens.h"
+#include "server/image/view.h"
 
 namespace touchstone::image {
 
@@ -18,10 +19,12 @@ struct PixelSurface {
   std::vector<float> incidence_rad, depth_m;
 };
 
-// `light`, height x width, becomes expected grey levels from 0 to 255. What lies beyond the picture's border is taken to
-// be as bright as the border. Error: an added term that is not finite.
-absl::Status RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens,
-                         const PixelSurface& surface, double session_time_s, std::vector<float>* light);
+// `light`, height x width, becomes expected grey levels from 0 to 255. Outside `object` it is the ground's. What lies beyond
+// the picture's border is taken to be as bright as the border. Returns the pixels outside which all grey levels are the
+// same. Error: an added term that is not finite.
+absl::StatusOr<PixelBox> RecordLight(const effects::PhotoSettings& settings, const PhotoLens& lens,
+                                     const PixelSurface& surface, double session_time_s,
+                                     const PixelBox& object, std::vector<float>* light);
 
 // Noise by (seed, index, pixel), rounded to 8 bits.
 void DrawPixels(const effects::PhotoSettings& settings, const std::vector<float>& grey, uint64_t seed,

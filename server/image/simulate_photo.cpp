@@ -244,7 +244,8 @@ absl::StatusOr<Photo> PhotoSimulator::Run(const PhotoRequest& request, const Pho
     Scatter(points, Incidences(points), static_cast<float>(0.5 * kPi), pixels, &surface.incidence_rad);
     Scatter(points, points.depth_m, 0.0f, pixels, &surface.depth_m);
   }
-  TOUCHSTONE_RETURN_IF_ERROR(RecordLight(settings, lens, surface, request.session_time_s, &photo.grey));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      photo.varied, RecordLight(settings, lens, surface, request.session_time_s, points.box, &photo.grey));
   if (outputs.pixels) DrawPixels(settings, photo.grey, request.seed, request.index, &photo.pixels);
   if (outputs.details) {
     Scatter(points, points.depth_m, 0.0f, pixels, &photo.depth_m);

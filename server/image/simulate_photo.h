@@ -16,6 +16,7 @@
 #include "server/geometry/surface.h"
 #include "server/image/image.h"
 #include "server/image/photograph.h"
+#include "server/image/view.h"
 #include "server/model/model.h"
 
 namespace touchstone::image {
@@ -35,6 +36,7 @@ struct PhotoRequest {
 struct Photo {
   int width = 0, height = 0;
   std::vector<float> grey;      // expected, before noise and rounding, 0 to 255
+  PixelBox varied;              // pixels outside which all grey levels are the same
   std::vector<uint8_t> pixels;  // with noise, rounded; empty unless asked
   std::vector<uint8_t> mask;    // 255: the object
   // Of the surface at each pixel, only if asked; 0 on the background.

@@ -54,6 +54,20 @@ View MakeView(const Camera& camera, const geometry::Bounds& bounds, const ImageO
   return view;
 }
 
+void FillAround(const PixelBox& box, float value, int width, std::vector<float>* picture) {
+  if (box.first_row >= box.last_row || box.first_column >= box.last_column) {
+    std::fill(picture->begin(), picture->end(), value);
+    return;
+  }
+  const auto begin_of = [&](int row) { return picture->begin() + static_cast<long>(row) * width; };
+  std::fill(picture->begin(), begin_of(box.first_row), value);
+  for (int row = box.first_row; row < box.last_row; ++row) {
+    std::fill_n(begin_of(row), box.first_column, value);
+    std::fill(begin_of(row) + box.last_column, begin_of(row + 1), value);
+  }
+  std::fill(begin_of(box.last_row), picture->end(), value);
+}
+
 PixelBox ProjectBounds(const View& view, const geometry::Bounds& bounds) {
   if (SmallestDepthM(view, bounds) < 0.5 * view.near_m) return {0, 0, view.width, view.height};
   Eigen::Vector2d min_pixel = view.Project(CornerOf(bounds, 0));

@@ -47,6 +47,8 @@ struct PixelBox {
   int last_column = 0;
   int last_row = 0;
 };
+// Sets the pixels of a picture, row by row, that lie outside the box; all of them where it is empty.
+void FillAround(const PixelBox& box, float value, int width, std::vector<float>* picture);
 PixelBox ProjectBounds(const View& view, const geometry::Bounds& bounds);
 
 // True if no part of the box is cut off by the near plane and the eye is outside it: of a closed surface only

@@ -12,6 +12,7 @@
 #include "server/diagnosis/images/photo_covariates.h"
 #include "server/diagnosis/images/photo_formula.h"
 #include "server/diagnosis/images/photo_rest_kinds.h"
+#include "server/diagnosis/images/photo_uneven_noise.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -196,22 +197,30 @@ class PhotoLadder {
     engine::UnexplainedRest rest;
     for (const PhotoCovariate& c : TestCovariates(judged, expected))
       if (c.p < kRestP && c.unseen_gain > kCurveGain) rest.covariates.push_back({c.name, c.p, c.gain_nats});
-    if (!misfit && !albedo && rest.covariates.empty() && selection_.field < 0) return absl::OkStatus();
+    // Noise that differs from part to part is no misfit of the means, and has the first word only where there is none.
+    const bool of_means = misfit || albedo || !rest.covariates.empty() || selection_.field >= 0;
+    const std::optional<UnevenNoise> uneven = FindUnevenNoise(judged, expected, pool_);
+    if (!of_means && !uneven) return absl::OkStatus();
     rest.rmse = d_.final->rmse;
     rest.heldout_rmse = d_.final->heldout_rmse;
-    TOUCHSTONE_RETURN_IF_ERROR(AddSuggestion(&rest));
-    DescribeKind(kinds, &rest);
+    if (of_means) TOUCHSTONE_RETURN_IF_ERROR(AddSuggestion(&rest));
+    if (of_means) DescribeKind(kinds, uneven.has_value(), &rest);
+    if (uneven) {
+      rest.covariates.push_back(uneven->test);
+      absl::StrAppend(&rest.words, rest.words.empty() ? "" : " ", uneven->words);
+    }
     d_.unexplained = std::move(rest);
     return absl::OkStatus();
   }
 
-  // The kind of the rest, unless a formula or a curve says more of it.
-  void DescribeKind(const std::vector<KindOfRest>& kinds, engine::UnexplainedRest* rest) const {
+  // The kind of the rest, unless a formula or a curve says more of it, or noise may be all of it.
+  void DescribeKind(const std::vector<KindOfRest>& kinds, bool uneven, engine::UnexplainedRest* rest) const {
     if (!kinds.empty() && kinds[0].share > rest->heldout_gain) {
       rest->words = kinds[0].words;
       return;
     }
-    if (!kinds.empty() || !rest->covariates.empty() || !rest->formula.empty() || !rest->lookup_yaml.empty())
+    if (uneven || !kinds.empty() || !rest->covariates.empty() || !rest->formula.empty() ||
+        !rest->lookup_yaml.empty())
       return;
     rest->words =
         "Pictures differ from what is expected by more than their pixels scatter. Nothing in the catalogue "

@@ -176,7 +176,7 @@ Eigen::VectorXd PhotoRows::Expect(const image::PhotoSimulator& simulator, const 
   absl::StatusOr<image::Photo> photo =
       simulator.Run(photographs_.requests[view.k], image::PhotoOutputs(), &view.workspace);
   if (!photo.ok()) return view.measured.array() + kFarRows;
-  photographs_.record->ToMeans(&photo->grey);
+  ToRecordedMeans(*photographs_.record, &*photo);
   return view.Project(grid_, photo->grey);
 }
 

@@ -239,7 +239,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         .Run(request, outputs, &workspace);
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(image::Photo photo, simulate(anchor, true));
-  photographs_.record->ToMeans(&photo.grey);
+  ToRecordedMeans(*photographs_.record, &photo);
   view->weights = CellWeights(grid_, photo.grey, *photographs_.record, options.contour_px2);
   const std::vector<float> contours = ContourSquares(photo.grey, width, height);
   DirectionColumns columns(grid_, view->weights, options.smoothing);
@@ -266,7 +266,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         }
       }
       if (absl::StatusOr<image::Photo> there = simulate(moved, false); there.ok()) {
-        photographs_.record->ToMeans(&there->grey);
+        ToRecordedMeans(*photographs_.record, &*there);
         const std::vector<float>& grey = there->grey;
         for (size_t i = 0; i < grey.size(); ++i) change[i] = grey[i] - photo.grey[i];
         if (!flow.move_px.empty()) {

@@ -130,6 +130,21 @@ absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadP
   return photographs;
 }
 
+void ToRecordedMeans(const RecordTable& record, image::Photo* photo) {
+  const image::PixelBox& box = photo->varied;
+  const int width = photo->width, columns = box.last_column - box.first_column;
+  if (columns == width || columns <= 0 || box.last_row <= box.first_row) {
+    record.ToMeans(&photo->grey);
+    return;
+  }
+  float* const first = &photo->grey[static_cast<size_t>(box.first_row) * width];
+  const float ground = box.first_column > 0 ? first[0] : first[box.last_column];
+  for (int row = 0; row < box.last_row - box.first_row; ++row)
+    record.ToMeans(first + static_cast<size_t>(row) * width + box.first_column, columns);
+  if (const float mean = record.Mean(ground); mean != ground)
+    image::FillAround(box, mean, width, &photo->grey);
+}
+
 absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& photographs,
                                                             const model::Model& model, bool details,
                                                             ThreadPool* pool) {
@@ -144,7 +159,7 @@ absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& p
       absl::StatusOr<image::Photo> photo = simulator.Run(photographs.requests[k], outputs, &workspace);
       statuses[k] = photo.status();
       if (!photo.ok()) continue;
-      photographs.record->ToMeans(&photo->grey);
+      ToRecordedMeans(*photographs.record, &*photo);
       photos[k] = *std::move(photo);
     }
   });

@@ -38,6 +38,9 @@ struct Photographs {
 // Checks that set, model and surfaces belong together. Errors name what is missing.
 absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadPool* pool);
 
+// The grey levels of an expected photograph become what is recorded of them on average.
+void ToRecordedMeans(const RecordTable& record, image::Photo* photo);
+
 // What `model` expects of every photograph; `grey` is what is recorded on average. `details`: also depth_m, ...,
 // point_m of each pixel. The same whatever the number of threads.
 absl::StatusOr<std::vector<image::Photo>> ExpectPhotographs(const Photographs& photographs,

@@ -21,9 +21,7 @@ constexpr double kKept = 0.8;             // share of the differences that count
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
 constexpr double kClipped = 4;            // standard deviations from black or white
 constexpr double kClippedBin = 5;         // ... of the levels of a bin whose scatter is not cut, at least
-constexpr double kTrimmedEfficiency =
-    0.35;                          // of a trimmed difference that shares pixels, as a degree of freedom
-constexpr double kMinCount = 200;  // differences that a bin needs
+constexpr double kMinCount = 200;         // differences that a bin needs
 
 // Of the smallest kKept of a histogram: their mean square, scaled to a normal number's variance.
 double TrimmedVariance(const double* counts, const double* squares, int steps) {
@@ -38,11 +36,6 @@ double TrimmedVariance(const double* counts, const double* squares, int steps) {
   }
   return total > 0 ? sum / (kKept * total) / kKeptVariance : 0;
 }
-
-// The scatter at one grey level.
-struct LevelScatter {
-  double grey = 0, variance = 0, count = 0;
-};
 
 // Levels whose pixels are hardly ever clipped: what is cut at black or white scatters too little. Where every level is
 // clipped, the one farthest from black and white.
@@ -111,14 +104,14 @@ float RecordTable::Mean(float grey) const {
   return mean_[below] + (place - static_cast<float>(below)) * (mean_[below + 1] - mean_[below]);
 }
 
-void RecordTable::ToMeans(std::vector<float>* grey) const {
+void RecordTable::ToMeans(float* grey, size_t size) const {
   // A diagnosis does this for every pixel that it expects, and most of them are grey levels that no clipping changes
   // (interpolating gives them back exactly), or a ground that is the same everywhere.
   float ground = std::numeric_limits<float>::quiet_NaN(), ground_mean = 0;
   const float first = first_kept_grey_, last = last_kept_grey_;
-  for (size_t begin = 0; begin < grey->size(); begin += kBlock) {
-    float* const values = grey->data() + begin;
-    const int count = static_cast<int>(std::min<size_t>(kBlock, grey->size() - begin));
+  for (size_t begin = 0; begin < size; begin += kBlock) {
+    float* const values = grey + begin;
+    const int count = static_cast<int>(std::min<size_t>(kBlock, size - begin));
     const Eigen::Map<const Eigen::ArrayXf> block(values, count);
     const float lowest = block.minCoeff(), highest = block.maxCoeff();
     if (lowest >= first && highest <= last) continue;
@@ -175,7 +168,7 @@ double NoiseGatherer::count() const {
   return sum;
 }
 
-PixelNoise NoiseGatherer::Estimate() const {
+std::vector<LevelScatter> NoiseGatherer::Levels() const {
   std::vector<LevelScatter> levels;
   constexpr double kBinGrey = kGreyLevels / kBins;
   for (int bin = 0; bin < kBins; ++bin) {
@@ -186,9 +179,13 @@ PixelNoise NoiseGatherer::Estimate() const {
                       std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance),
                       count});
   }
+  return Unclipped(levels, kBinGrey);
+}
+
+PixelNoise NoiseGatherer::Estimate() const {
   // variance = sigma^2 + gain * grey over the levels, each weighed by count / variance^2.
   std::vector<double> grey, variance, weight;
-  for (const LevelScatter& level : Unclipped(levels, kBinGrey)) {
+  for (const LevelScatter& level : Levels()) {
     grey.push_back(level.grey);
     variance.push_back(level.variance);
     weight.push_back(level.count / (level.variance * level.variance));

@@ -1,6 +1,7 @@
 // How much single pixels scatter, as images themselves show it: from what neighbouring pixels differ by.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace touchstone::diagnosis::images {
@@ -25,8 +26,9 @@ class RecordTable {
  public:
   explicit RecordTable(const PixelNoise& noise);
   float Mean(float grey) const;
-  // The same of a whole picture, in place.
-  void ToMeans(std::vector<float>* grey) const;
+  // The same of many pixels, in place.
+  void ToMeans(float* grey, size_t count) const;
+  void ToMeans(std::vector<float>* grey) const { ToMeans(grey->data(), grey->size()); }
   // Of a pixel that records `mean` on average.
   double Variance(double mean) const { return At(variance_, mean); }
   double Clipped(double mean) const { return At(clipped_, mean); }
@@ -40,6 +42,14 @@ class RecordTable {
   std::vector<float> variance_, clipped_;  // by what is recorded on average
 };
 
+// The scatter at one grey level.
+struct LevelScatter {
+  double grey = 0, variance = 0;
+  double count = 0;  // of differences
+};
+inline constexpr double kTrimmedEfficiency =
+    0.35;  // of such a difference, which is trimmed and shares pixels, as a degree of freedom
+
 // Gathers second differences of images along their rows, by grey level.
 class NoiseGatherer {
  public:
@@ -52,6 +62,8 @@ class NoiseGatherer {
 
   // The noise of the smoother four fifths of the pixels: edges and texture take no part, where they are fewer.
   PixelNoise Estimate() const;
+  // By grey level, where enough differences are; of levels that clipping hardly touches, or of the one that it touches least.
+  std::vector<LevelScatter> Levels() const;
   double count() const;
 
  private:

@@ -11,8 +11,8 @@
 #include <set>
 #include <utility>
 
-#include "server/base/distributions.h"
 #include "server/base/units.h"
+#include "server/diagnosis/engine/uneven_parts.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -21,15 +21,12 @@ using touches::NoiseModel;
 using touches::NoiseShape;
 using touches::ReadingGroup;
 
-constexpr double kUnevenNats = 10;
-constexpr double kUnevenRatio = 4.0 / 3;  // of the largest scale over the smallest
-constexpr double kTailsWithinNats = 10;   // that tails within the parts must earn
-constexpr double kOneFingerNats = 3;      // by which one finger must be ahead of all together
-constexpr size_t kRepeatsAsked = 60;      // groups, for repeats to be asked
+constexpr double kTailsWithinNats = 10;  // that tails within the parts must earn
+constexpr double kOneFingerNats = 3;     // by which one finger must be ahead of all together
+constexpr size_t kRepeatsAsked = 60;     // groups, for repeats to be asked
 constexpr int kMinTouchesOfPart = 15;
 constexpr int kMaxParts = 24;
 constexpr size_t kMaxScatterGroups = 3000;  // of a large set, evenly
-constexpr double kAlikeShare = 0.6;         // of the gain, of what says nearly the same
 constexpr int kScatterQuarters = 4;
 constexpr double kTails[] = {2, 4, 8, 20};  // degrees of freedom that are tried
 
@@ -183,19 +180,20 @@ std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& gro
   if (parts.size() < 2) return std::nullopt;
   std::vector<ReadingGroup> together;
   for (const auto& part : parts) together.insert(together.end(), part.begin(), part.end());
-  const double degrees = static_cast<double>(parts.size()) - 1;
-  const double penalty = 0.5 * degrees * std::log(static_cast<double>(together.size()));
-  const double enough = kUnevenNats + penalty;
+  const double count = static_cast<double>(parts.size()), touches = static_cast<double>(together.size());
   // Heavy tails make parts differ by chance: what differs with them differs without.
-  if (own_share * GaussianGain(parts, together, model) < enough) return std::nullopt;
+  if (own_share * GaussianGain(parts, together, model) < engine::EnoughToBeUneven(count, touches))
+    return std::nullopt;
   const ScaleFit one = FitScales({together}, model), each = FitScales(parts, model);
   const double gain = own_share * (each.any - one.any);
   const auto [low, high] = std::minmax_element(each.scale_s.begin(), each.scale_s.end());
-  if (gain < enough || *high < kUnevenRatio * *low) return std::nullopt;
+  const std::optional<engine::CovariateTest> test =
+      engine::JudgeUneven(partition.covariate, gain, count, touches, *low, *high);
+  if (!test) return std::nullopt;
   UnevenScatter found;
   for (size_t j = 0; j < parts.size(); ++j)
     found.parts.push_back({names[j], each.scale_s[j], static_cast<int>(parts[j].size())});
-  found.test = {partition.covariate, ChiSquaredTail(2 * gain, degrees), gain - penalty};
+  found.test = *test;
   found.tails_remain = each.any - each.gaussian > kTailsWithinNats;
   return found;
 }
@@ -273,7 +271,7 @@ std::optional<UnevenScatter> WorstPartition(const View& view, const std::vector<
   UnevenScatter& scatter = found[best];
   std::vector<std::string> alike;
   for (size_t j = 0; j < found.size(); ++j) {
-    if (j == best || found[j].test.gain_nats < kAlikeShare * scatter.test.gain_nats) continue;
+    if (j == best || found[j].test.gain_nats < engine::kAlikeUnevenShare * scatter.test.gain_nats) continue;
     scatter.alike.push_back(found[j].test);
     alike.push_back(by[j]);
   }
