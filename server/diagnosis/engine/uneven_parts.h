@@ -22,8 +22,8 @@ inline double EnoughToBeUneven(double parts, double count) {
 
 // `gain_nats`: of log likelihood, of a scale for each of `parts` parts over one for all. Nothing where one scale says the
 // same. The p-value is of this way to part the set alone.
-inline std::optional<CovariateTest> JudgeUneven(const std::string& covariate, double gain_nats, double parts,
-                                                double count, double smallest_scale, double largest_scale) {
+inline std::optional<CovariateTest> TestUneven(const std::string& covariate, double gain_nats, double parts,
+                                               double count, double smallest_scale, double largest_scale) {
   const double enough = EnoughToBeUneven(parts, count);
   if (gain_nats < enough || largest_scale < kUnevenRatio * smallest_scale) return std::nullopt;
   return CovariateTest{covariate, ChiSquaredTail(2 * gain_nats, parts - 1), gain_nats - enough + kUnevenNats};

@@ -34,7 +34,7 @@ struct NoisyPartition {
 };
 
 // Residuals, and expected grey levels, 0 as clipped ones at contours. A measured level would choose a pixel by its noise.
-struct JudgedPicture {
+struct AssessedPicture {
   std::vector<float> residual, level;
 };
 
@@ -49,7 +49,7 @@ NoisyPart PartOf(std::string name, const NoiseGatherer& gathered, const PixelNoi
   return part;
 }
 
-std::optional<engine::CovariateTest> Judge(NoisyPartition* partition) {
+std::optional<engine::CovariateTest> TestParts(NoisyPartition* partition) {
   std::vector<NoisyPart>& parts = partition->parts;
   parts.erase(std::remove_if(parts.begin(), parts.end(),
                              [](const NoisyPart& part) { return part.degrees < kMinDegrees; }),
@@ -62,27 +62,27 @@ std::optional<engine::CovariateTest> Judge(NoisyPartition* partition) {
   for (const NoisyPart& part : parts)
     gain_nats += 0.5 * part.degrees * (part.ratio / mean - 1 - std::log(part.ratio / mean));
   std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.ratio < b.ratio; });
-  return engine::JudgeUneven(partition->covariate, gain_nats, static_cast<double>(parts.size()), degrees,
-                             std::sqrt(parts.front().ratio), std::sqrt(parts.back().ratio));
+  return engine::TestUneven(partition->covariate, gain_nats, static_cast<double>(parts.size()), degrees,
+                            std::sqrt(parts.front().ratio), std::sqrt(parts.back().ratio));
 }
 
 class UnevenNoiseSearch {
  public:
   UnevenNoiseSearch(const Photographs& photographs, const std::vector<image::Photo>& expected,
                     ThreadPool* pool)
-      : p_(photographs), expected_(expected), pool_(pool), judged_(p_.size()), of_picture_(p_.size()) {
+      : p_(photographs), expected_(expected), pool_(pool), assessed_(p_.size()), of_picture_(p_.size()) {
     ParallelFor(pool_, p_.size(), 1, [&](int begin, int end) {
       for (int k = begin; k < end; ++k) {
-        JudgedPicture& judged = judged_[k];
-        judged.residual = p_.measured_grey[k];
-        judged.level = expected_[k].grey;
+        AssessedPicture& assessed = assessed_[k];
+        assessed.residual = p_.measured_grey[k];
+        assessed.level = expected_[k].grey;
         const std::vector<float> contours = ContourSquares(expected_[k].grey, p_.width(), p_.height());
         for (size_t i = 0; i < contours.size(); ++i) {
-          judged.residual[i] -= expected_[k].grey[i];
+          assessed.residual[i] -= expected_[k].grey[i];
           if (contours[i] > kContourGrey * kContourGrey || p_.record->Clipped(expected_[k].grey[i]) > kMaxCut)
-            judged.level[i] = 0;
+            assessed.level[i] = 0;
         }
-        of_picture_[k].Add(judged.residual, judged.level, p_.width(), p_.height(), 1);
+        of_picture_[k].Add(assessed.residual, assessed.level, p_.width(), p_.height(), 1);
       }
     });
     for (const NoiseGatherer& one : of_picture_) all_.Add(one);
@@ -156,10 +156,10 @@ class UnevenNoiseSearch {
     ParallelFor(pool_, count, 1, [&](int begin, int end) {
       for (int j = begin; j < end; ++j)
         for (int k = 0; k < p_.size(); ++k) {
-          std::vector<float> level = judged_[k].level;
+          std::vector<float> level = assessed_[k].level;
           for (size_t i = 0; i < level.size(); ++i)
             if (part_of(k, i) != j) level[i] = 0;
-          parts[j].Add(judged_[k].residual, level, p_.width(), p_.height(), 1);
+          parts[j].Add(assessed_[k].residual, level, p_.width(), p_.height(), 1);
         }
     });
     NoisyPartition made{std::move(covariate), std::move(by), {}};
@@ -170,7 +170,7 @@ class UnevenNoiseSearch {
   const Photographs& p_;
   const std::vector<image::Photo>& expected_;
   ThreadPool* pool_;
-  std::vector<JudgedPicture> judged_;
+  std::vector<AssessedPicture> assessed_;
   std::vector<NoiseGatherer> of_picture_;
   NoiseGatherer all_;
   PixelNoise noise_;
@@ -185,7 +185,7 @@ std::optional<UnevenNoise> FindUnevenNoise(const Photographs& p, const std::vect
   std::vector<std::optional<engine::CovariateTest>> tests;
   size_t best = all.size();
   for (size_t j = 0; j < all.size(); ++j) {
-    tests.push_back(Judge(&all[j]));
+    tests.push_back(TestParts(&all[j]));
     if (tests[j] && (best == all.size() || tests[j]->gain_nats > tests[best]->gain_nats)) best = j;
   }
   if (best == all.size()) return std::nullopt;

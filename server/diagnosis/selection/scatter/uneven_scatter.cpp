@@ -188,7 +188,7 @@ std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& gro
   const double gain = own_share * (each.any - one.any);
   const auto [low, high] = std::minmax_element(each.scale_s.begin(), each.scale_s.end());
   const std::optional<engine::CovariateTest> test =
-      engine::JudgeUneven(partition.covariate, gain, count, touches, *low, *high);
+      engine::TestUneven(partition.covariate, gain, count, touches, *low, *high);
   if (!test) return std::nullopt;
   UnevenScatter found;
   for (size_t j = 0; j < parts.size(); ++j)
