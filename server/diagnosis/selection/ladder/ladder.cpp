@@ -239,9 +239,11 @@ class LadderBuilder {
     if (uneven_->finger >= 0) noise->channel_sigma_s.clear();
   }
 
-  // What reaches farther to one side looks heavy-tailed.
+  // What reaches farther to one side looks heavy-tailed. A misfit does by itself.
   void AskLopsidedScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
-    if (selection_.noise.poll_interval_s.gain_nats > 0) return;
+    if (selection_.noise.poll_interval_s.gain_nats > 0 || found_.Leave(Leaves::kMeans) ||
+        selection_.fit.hypothesis != 0)
+      return;
     const auto lopsided = FindLopsidedScatter(sample.groups, observations_.fingers);
     if (!lopsided) return;
     found_.Add(Hypothesis::kLopsided, lopsided->words);
