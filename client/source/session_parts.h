@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "client/source/measurement_csv.h"
+#include "touchstone/v1/source.pb.h"
 
 namespace touchstone::client {
 
