@@ -14,6 +14,7 @@
 #include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::cli {
 namespace {

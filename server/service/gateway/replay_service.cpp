@@ -5,6 +5,7 @@
 #include "server/base/over_limit.h"
 #include "server/base/status.h"
 #include "server/gateway/calibration/calibration.h"
+#include "server/gateway/calibration/resting_face.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
 #include "server/session/command_bytes.h"
