@@ -110,9 +110,11 @@ absl::StatusOr<TouchResults> VirtualSource::MakeTouches(const TouchRequest& requ
   results.fingers = model->fingers;
   results.model = model;
   std::vector<double> press_m(model->fingers, 0.0);  // of the touch before the block
-  if (!request.previous.empty() && simulator.needs_previous_press()) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const ServedObject* before,
-                                objects().Find(request.previous.back().object, "previous.object"));
+  const ServedObject* before = nullptr;              // the object of the touch before
+  for (const PreviousTouch& previous : request.previous) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(before, objects().Find(previous.object, "previous.object"));
+  }
+  if (before != nullptr && simulator.needs_previous_press()) {
     TouchRequest alone;
     alone.touches = {request.previous.back().touch};
     alone.previous.assign(request.previous.begin(), request.previous.end() - 1);

@@ -1,5 +1,5 @@
 // Contact forces of the fingers, a kind of measurement that the product does not have: each finger is a spring that the
-// touch presses. Everything that the diagnosis has to know of it stands in ContactForces; server/diagnosis/README.md leads
+// touch presses. Everything that the diagnosis has to know of it stands in ContactForces; server/README.md leads
 // through it.
 #include <cmath>
 

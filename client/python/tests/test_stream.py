@@ -152,6 +152,8 @@ def test_touches_in_two_calls_are_those_of_one(client):
     np.testing.assert_array_equal(whole[5:], later)
     alone = client.touch("lat20", touches[5:], model=remembers, start=5)["contact_time_us"]
     assert (alone[:2] != later[:2]).any(axis=1).all() and (alone[2:] == later[2:]).all()
+    with pytest.raises(touchstone.TouchstoneError, match=r"previous\.object.*lat99"):
+        client.touch("lat20", touches, previous=("lat99", touches[:1]))
 
 
 def test_the_catalogue_and_the_store_are_readable(client, tmp_path):

@@ -1,5 +1,5 @@
 // The most that one request, one client or the whole process may use: the one table that the configuration, the checks,
-// Source.Describe and deploy/limits.md share.
+// Source.Describe and server/LIMITS.md share.
 #pragma once
 
 #include <cstddef>

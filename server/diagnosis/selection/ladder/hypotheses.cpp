@@ -11,7 +11,7 @@ const std::vector<HypothesisRule>& HypothesisRules() {
   using H = Hypothesis;
   using L = Leaves;
   using Q = Question;
-  // Under a wander repeats are alike by chance: tests of their scatter do not hold.
+  // Under correlated noise repeats are alike by chance: tests of their scatter do not hold.
   const std::vector<Question> of_scatter = {Q::kRounds,       Q::kSurface, Q::kPoseScatter, Q::kUnevenScatter,
                                             Q::kAbsentMemory, Q::kCourse,  Q::kMisfit};
   static const auto& rules = *new std::vector<HypothesisRule>{
@@ -21,8 +21,8 @@ const std::vector<HypothesisRule>& HypothesisRules() {
        "partial offset",
        L::kMeans,
        {Q::kRounds, Q::kSurface, Q::kPoseScatter, Q::kNoise, Q::kUnevenScatter}},
-      {H::kWalk, "walk", L::kMeans, of_scatter},
-      {H::kWander, "wander", L::kNothing, of_scatter},
+      {H::kRandomWalk, "random walk", L::kMeans, of_scatter},
+      {H::kCorrelatedNoise, "correlated noise", L::kNothing, of_scatter},
       // A curve of time looks like rounds, and any curve like bumps.
       {H::kCurve, "curve", L::kMeans, {Q::kRounds, Q::kSurface}},
       {H::kFormula, "formula", L::kMeans, {Q::kMisfit}},

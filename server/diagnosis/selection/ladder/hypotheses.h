@@ -12,19 +12,19 @@ namespace touchstone::diagnosis::selection {
 
 // In the order in which they are said: the first of those that were found says what is left.
 enum class Hypothesis {
-  kGroup,          // one part of the session differs by one effect (group_difference.h)
-  kPartialOffset,  // some touches, no part of the session, have an offset (partial_offset.h)
-  kWalk,           // the fingers wander, and nothing shows that they come back (noise_memory.h)
-  kWander,         // noise with a known memory (noise_memory.h)
-  kCurve,          // a curve over one covariate (nameless_curve.h)
-  kFormula,        // a term of the dictionary, or such a curve as a part of the model (formula_terms.h)
-  kUnplaced,       // a misfit that repeats with the pose and not with the place (surface_support.h)
-  kRemounted,      // the object lies elsewhere in every round (round_structure.h)
-  kStrangeValues,  // values at their bounds, many of sizes that no rig shows (doubts.h)
-  kUnevenScatter,  // the noise differs between parts of the set (uneven_scatter.h)
-  kLopsided,       // the noise reaches farther to one side (lopsided_scatter.h)
-  kSetAside,       // what the fit set aside is more than a few gross errors (touches_set_aside.h)
-  kTicks,          // some of the times were read in ticks (touches/ticks.h)
+  kGroup,            // one part of the session differs by one effect (group_difference.h)
+  kPartialOffset,    // some touches, no part of the session, have an offset (partial_offset.h)
+  kRandomWalk,       // a random walk of the fingers (noise_memory.h)
+  kCorrelatedNoise,  // noise with a known memory (noise_memory.h)
+  kCurve,            // a curve over one covariate (nameless_curve.h)
+  kFormula,          // a term of the dictionary, or such a curve as a part of the model (formula_terms.h)
+  kUnplaced,         // a misfit that repeats with the pose and not with the place (surface_support.h)
+  kRemounted,        // the object lies elsewhere in every round (round_structure.h)
+  kStrangeValues,    // values at their bounds, many of sizes that no rig shows (doubts.h)
+  kUnevenScatter,    // the noise differs between parts of the set (uneven_scatter.h)
+  kLopsided,         // the noise reaches farther to one side (lopsided_scatter.h)
+  kSetAside,         // what the fit set aside is more than a few gross errors (touches_set_aside.h)
+  kTicks,            // some of the times were read in ticks (touches/ticks.h)
   kPlay,    // the object lies elsewhere, or the arm is faster or slower, at every touch (pose_scatter.h)
   kCourse,  // repeats share a course in time (time_structure.h)
   kMisfit,  // a lack of fit, of whatever kind (engine/findings.h)
@@ -37,7 +37,7 @@ enum class Question {
   kPoseScatter,    // do repeats scatter as an object does that moves?
   kNoise,          // which noise of the fingers?
   kUnevenScatter,  // does it differ between parts of the set?
-  kAbsentMemory,   // does the wander that the model has show at all?
+  kAbsentMemory,   // does the correlated noise that the model has show at all?
   kCourse,         // do repeats share a course in time?
   kMisfit,         // is there a lack of fit?
 };

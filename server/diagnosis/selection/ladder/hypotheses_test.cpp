@@ -34,13 +34,13 @@ TEST(Hypotheses, NothingFoundLeavesNothingAndAllowsEveryQuestion) {
   EXPECT_THAT(none.Words(), IsEmpty());
 }
 
-TEST(Hypotheses, AWanderIsExplainedAndAWalkIsNot) {
-  Hypotheses wander, walk;
-  wander.Add(Hypothesis::kWander);
-  walk.Add(Hypothesis::kWalk, "The fingers wander.");
-  EXPECT_FALSE(wander.Leave(Leaves::kScatter));
+TEST(Hypotheses, CorrelatedNoiseIsExplainedAndARandomWalkIsNot) {
+  Hypotheses correlated, walk;
+  correlated.Add(Hypothesis::kCorrelatedNoise);
+  walk.Add(Hypothesis::kRandomWalk, "The fingers wander.");
+  EXPECT_FALSE(correlated.Leave(Leaves::kScatter));
   EXPECT_TRUE(walk.Leave(Leaves::kMeans));
-  for (const Hypotheses& memory : {wander, walk}) {
+  for (const Hypotheses& memory : {correlated, walk}) {
     EXPECT_FALSE(memory.Allows(Question::kMisfit));
     EXPECT_TRUE(memory.Allows(Question::kNoise));
   }

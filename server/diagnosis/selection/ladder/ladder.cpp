@@ -94,14 +94,14 @@ class LadderBuilder {
     const NameFirst name_time = [this](engine::UnexplainedRest* rest) {
       NameTimeFirst(observations_, ladder_.noise_floor, rest);
     };
-    if (selection_.memory && Walks())
-      found_.Add(Hypothesis::kWalk,
+    if (selection_.memory && IsRandomWalk())
+      found_.Add(Hypothesis::kRandomWalk,
                  "The fingers wander through the whole session, and nothing shows that they come back: a "
                  "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
                  "session.",
                  name_time);
     else if (selection_.memory)
-      found_.Add(Hypothesis::kWander);
+      found_.Add(Hypothesis::kCorrelatedNoise);
     if (found_.Allows(Question::kCourse) && SharesTime(ladder_.noise_floor))
       found_.Add(Hypothesis::kCourse, "", name_time);
     if (selection_.group)
@@ -113,9 +113,9 @@ class LadderBuilder {
     if (selection_.curve) found_.Add(Hypothesis::kCurve, CourseInWords(selection_.curve->words));
   }
 
-  // A wander of which the session does not show that it comes back is no noise of a known memory, unless the given
+  // A drift of which the session does not show that it reverts to its mean is no noise of a known memory, unless the given
   // model says so.
-  bool Walks() const {
+  bool IsRandomWalk() const {
     const auto& given = workspace_.input.model->effects;
     return !Forgets(*selection_.memory) &&
            std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
