@@ -20,12 +20,14 @@ class Finder {
 
   absl::StatusOr<Findings> Run() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const Quality initial, modality_.Compare(modality_.given()));
-    for (;;) {
+    for (StepsAtEnd at_end;;) {
       found_ = Findings();
       found_.initial = initial;
-      TOUCHSTONE_RETURN_IF_ERROR(Climb());
+      TOUCHSTONE_RETURN_IF_ERROR(Climb(at_end.effects()));
       const int step = StepWithoutGain(initial, QualitiesOf(found_.steps));
       if (step < 0) break;
+      if (at_end.MoveToEnd(climbed_[step], climbed_)) continue;
+      at_end.TakeOut(climbed_[step]);
       TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit,
                                   FitModel(experiment_, whole_.fit.model.Without(climbed_[step])));
     }
@@ -44,7 +46,7 @@ class Finder {
 
  private:
   // Values, steps and their errors of the explanation as it stands.
-  absl::Status Climb() {
+  absl::Status Climb(const std::vector<int>& at_end) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const FinalRows rows, modality_.RowsNear(whole_.fit));
     values_ = whole_.fit;
     if (rows.owner != nullptr) {
@@ -54,7 +56,7 @@ class Finder {
     found_.improved = values_.model.base();
     RoundValues(values_, &found_.improved);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven(covariance));
-    return DescribeSteps(covariance);
+    return DescribeSteps(covariance, at_end);
   }
 
   absl::StatusOr<Quality> QualityOf(const model::Model& model, const Fit& searched, const Fit& final) const {
@@ -76,11 +78,11 @@ class Finder {
     return absl::OkStatus();
   }
 
-  absl::Status DescribeSteps(const Eigen::MatrixXd& covariance) {
+  absl::Status DescribeSteps(const Eigen::MatrixXd& covariance, const std::vector<int>& at_end) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<SelectedStep> selected,
                                 FindCompetitors(search_, whole_, -1, {}));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<OrderedStep> ordered,
-                                OrderSteps(experiment_, whole_, -1, selected));
+                                OrderSteps(experiment_, whole_, -1, selected, at_end));
     climbed_.clear();
     for (const OrderedStep& next : ordered) {
       LadderStep step = DescribeStep(values_, covariance, *next.step);

@@ -34,10 +34,22 @@ bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& e
   return true;
 }
 
+// Whether a step may come before the others that are open.
+bool IsNext(const SelectedStep& step, const std::vector<const SelectedStep*>& open,
+            const std::vector<int>& at_end) {
+  const auto place = [&](const SelectedStep& of) {
+    const auto found = std::find(at_end.begin(), at_end.end(), of.effect);
+    return found == at_end.end() ? -1 : found - at_end.begin();
+  };
+  return std::all_of(open.begin(), open.end(),
+                     [&](const SelectedStep* other) { return place(step) <= place(*other); });
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment, const Explanation& whole,
-                                                    int nameless, const std::vector<SelectedStep>& steps) {
+                                                    int nameless, const std::vector<SelectedStep>& steps,
+                                                    const std::vector<int>& at_end) {
   std::vector<OrderedStep> ordered;
   std::vector<const SelectedStep*> open;
   for (const SelectedStep& step : steps) open.push_back(&step);
@@ -47,6 +59,7 @@ absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment
     size_t chosen = 0;
     const bool last = open.size() == 1 && nameless < 0;
     for (size_t j = 0; j < open.size(); ++j) {
+      if (!IsNext(*open[j], open, at_end)) continue;
       std::vector<int> with = kept;
       with.push_back(open[j]->effect);
       absl::StatusOr<Fit> trial =
@@ -71,6 +84,18 @@ int StepWithoutGain(const Quality& before, const std::vector<Quality>& after) {
     last = &after[j];
   }
   return -1;
+}
+
+bool StepsAtEnd::MoveToEnd(int effect, const std::vector<int>& climbed) {
+  if (climbed.back() == effect || std::find(effects_.begin(), effects_.end(), effect) != effects_.end())
+    return false;
+  effects_.push_back(effect);
+  return true;
+}
+
+void StepsAtEnd::TakeOut(int effect) {
+  effects_.erase(std::remove(effects_.begin(), effects_.end(), effect), effects_.end());
+  for (int& other : effects_) other -= other > effect;
 }
 
 std::vector<Quality> QualitiesOf(const std::vector<LadderStep>& steps) {

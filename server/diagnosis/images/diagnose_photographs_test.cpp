@@ -144,6 +144,23 @@ TEST(DiagnosePhotographs, FindsAWrongCameraFileBesideExposureAndLens) {
   }
 }
 
+// With a part of the explanation the error rises; each of these steps takes most of it on top of all others.
+TEST(DiagnosePhotographs, KeepsAStepThatNeedsThoseBehindIt) {
+  TOUCHSTONE_SECOND_TIER("long: whole diagnoses of pictures");
+  const std::vector<NamedValues> cameras = {
+      {{"principal_point", {"offset_px=-30,0"}}},
+      {{"principal_point", {"offset_px=-15,0"}}, {"focal_error", {"relative=-0.0385"}}}};
+  for (const NamedValues& camera : cameras) {
+    HiddenCamera rig;
+    rig.side_px = 224;
+    rig.hidden = {{"exposure", {"stops=0.25"}}, {"radial_distortion", {"k1=-0.15"}}};
+    rig.hidden.insert(rig.hidden.end(), camera.begin(), camera.end());
+    const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+    EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
+    EXPECT_EQ(d.steps.size(), rig.hidden.size());
+  }
+}
+
 TEST(DiagnosePhotographs, NamesBothOfAPair) {
   TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;

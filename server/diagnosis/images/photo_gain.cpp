@@ -136,22 +136,24 @@ class LargeSteps {
 // whose effect is `idle` (-1: every step has one). What lies beyond is not fitted without its parts, which takes longest.
 struct Rungs {
   std::vector<PhotoRung> rungs;
+  std::vector<int> order;  // all effects
   int idle = -1;
 };
 
 absl::StatusOr<Rungs> RungsOf(const Photographs& photographs, const DiagnosisContext& context,
-                              const PhotoSelection& selection) {
+                              const PhotoSelection& selection, const std::vector<int>& at_end) {
   const engine::Experiment& experiment = *selection.fine.experiment;
   std::vector<engine::SelectedStep> steps;
   for (int e = selection.initial_effects; e < static_cast<int>(selection.fit.model.base().effects.size());
        ++e)
     if (e != selection.field) steps.emplace_back().effect = e;
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      std::vector<engine::OrderedStep> ordered,
-      engine::OrderSteps(experiment, {selection.fit, selection.initial_effects}, selection.field, steps));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<engine::OrderedStep> ordered,
+                              engine::OrderSteps(experiment, {selection.fit, selection.initial_effects},
+                                                 selection.field, steps, at_end));
   TOUCHSTONE_ASSIGN_OR_RETURN(const double given,
                               ErrorOf(photographs, selection.initial.model.base(), context.pool));
   Rungs made;
+  for (const engine::OrderedStep& step : ordered) made.order.push_back(step.step->effect);
   std::vector<engine::Quality> after;
   for (engine::OrderedStep& step : ordered) {
     const engine::Fit alone = step.fit;
@@ -212,15 +214,18 @@ absl::Status HoldChoices(PhotoSelection* selection) {
 
 absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection) {
-  for (;;) {
-    TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
-    TOUCHSTONE_ASSIGN_OR_RETURN(Rungs made, RungsOf(photographs, context, *selection));
+  TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
+  for (engine::StepsAtEnd at_end;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(Rungs made, RungsOf(photographs, context, *selection, at_end.effects()));
     selection->rungs = std::move(made.rungs);
-    if (made.idle < 0) return absl::OkStatus();
     const int effect = made.idle;
+    if (effect < 0) return absl::OkStatus();
+    if (at_end.MoveToEnd(effect, made.order)) continue;
+    at_end.TakeOut(effect);
     TOUCHSTONE_ASSIGN_OR_RETURN(
         selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(effect)));
     if (selection->field > effect) --selection->field;
+    TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
   }
 }
 

@@ -20,8 +20,8 @@ std::vector<engine::SelectedStep> StepsWithoutFormula(const SelectionResult& sel
 
 class Climber {
  public:
-  Climber(const Workspace& workspace, const SelectionResult& selection)
-      : workspace_(workspace), selection_(selection), ladder_(climb_.ladder) {
+  Climber(const Workspace& workspace, const SelectionResult& selection, const std::vector<int>& at_end)
+      : workspace_(workspace), selection_(selection), at_end_(at_end), ladder_(climb_.ladder) {
     climb_.searched = has_formula() ? &selection.without_formula : &selection.fit;
     climb_.steps = StepsWithoutFormula(selection);
   }
@@ -32,10 +32,7 @@ class Climber {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         climb_.before, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
     const int step = engine::StepWithoutGain(climb_.before, engine::QualitiesOf(ladder_.steps));
-    if (step >= 0) {
-      const int effect = climbed_[step];
-      climb_.without_gain = effect + (has_formula() && effect >= selection_.formula);
-    }
+    if (step >= 0) climb_.without_gain = climb_.order[step];
     return std::move(climb_);
   }
 
@@ -91,7 +88,7 @@ class Climber {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const std::vector<engine::OrderedStep> ordered,
         engine::OrderSteps(workspace_.experiment, {*climb_.searched, selection_.initial_effects}, -1,
-                           climb_.steps));
+                           climb_.steps, at_end_));
     for (const engine::OrderedStep& step : ordered) TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(step));
     return absl::OkStatus();
   }
@@ -102,7 +99,7 @@ class Climber {
     AddOrder(ordered.step->effect, &step);
     step.model = ordered.whole ? ladder_.improved : ordered.fit.model.base();
     TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOfModel(workspace_, ordered.fit, step.model));
-    climbed_.push_back(ordered.step->effect);
+    climb_.order.push_back(ordered.step->effect);
     ladder_.steps.push_back(std::move(step));
     return absl::OkStatus();
   }
@@ -118,9 +115,9 @@ class Climber {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
+  const std::vector<int>& at_end_;
   Climb climb_;
-  Ladder& ladder_;            // the climb's
-  std::vector<int> climbed_;  // the effect of each of the ladder's steps, by its index in what is saved
+  Ladder& ladder_;  // the climb's
 };
 
 }  // namespace
@@ -141,8 +138,9 @@ absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit
   return whole;
 }
 
-absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection) {
-  return Climber(workspace, selection).Run();
+absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection,
+                                 const std::vector<int>& at_end) {
+  return Climber(workspace, selection, at_end).Run();
 }
 
 }  // namespace touchstone::diagnosis::selection
