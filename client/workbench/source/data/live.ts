@@ -95,16 +95,19 @@ function errorIn(report: Uint8Array, entry: number): number {
   return rmse ? double(rmse) : quality ? 0 : Number.NaN;
 }
 
-// The report of the last rung: its error at once, the views after the browser has painted it, unless a slider has moved on.
-async function show(report: Uint8Array, signal: AbortSignal): Promise<Report | null> {
+// The report of the last rung: its error at once, the views once the browser has painted it and no slider has moved for `restMs`:
+// to draw them takes longer than to compare, and a slider that moves on would wait for it.
+async function show(report: Uint8Array, signal: AbortSignal, restMs = 0): Promise<Report | null> {
   const setError = (entry: number) => {
     const rmse = errorIn(report, entry);
     rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
   };
   setError(page.value?.words.main ?? 0);
+  if (moved.value) return null; // a slider's next value waits already
   const mine = (drawing = new AbortController());
   try {
     await painted();
+    if (restMs) await rest(restMs, mine.signal);
     const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal: AbortSignal.any([signal, mine.signal]) })).text());
     signal.throwIfAborted();
     mine.signal.throwIfAborted();
@@ -125,11 +128,18 @@ const painted = () => new Promise<void>((done) => {
   requestAnimationFrame(() => setTimeout(done));
 });
 
+const rest = (ms: number, signal: AbortSignal) => new Promise<void>((done, moved) => {
+  const timer = setTimeout(done, ms);
+  signal.addEventListener("abort", () => { clearTimeout(timer); moved(signal.reason as Error); }, { once: true });
+  if (signal.aborted) { clearTimeout(timer); moved(signal.reason as Error); }
+});
+const sliderRestMs = 150; // a hand that drags a slider says something every frame
+
 async function change(of: Record<string, unknown>): Promise<Model> {
   return (await local("model", { method: "POST", body: JSON.stringify(of) })).json() as Promise<Model>;
 }
 
-const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
+const compareLast = async (signal: AbortSignal, restMs = 0) => { await show(await ask("Compare", model.value!.yaml, signal), signal, restMs); };
 
 // What a reload of the page needs: where the measurements came from, and the model with its steps.
 interface Kept { token: string; path: string; saved: string; rungs: { name: string; yaml: string; rmse: number | null }[] }
@@ -239,15 +249,14 @@ export async function addFormula(name: string, adds: string, expression: string,
 // A slider's value. Values that come while one is compared wait, and the last of them is the next: the error follows a slider
 // that moves all the time. All of them are one rung, which Undo takes away.
 export function setValue(move: Move): void {
-  const idle = !moved.value;
   moved.value = move;
   drawing.abort();
-  if (!idle && working.value?.what === byHand) return;
+  if (working.value?.what === byHand) return; // the comparison under way ends, else a hand that moves on would see no error
   stale.value = true;
   void doing(byHand, async (signal) => {
     do {
       if (moved.value) await takeValue(moved.value, signal);
-      await compareLast(signal);
+      await compareLast(signal, sliderRestMs);
     } while (moved.value);
   });
 }
