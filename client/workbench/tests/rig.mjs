@@ -61,6 +61,16 @@ test("a plan, its dry run, a run, and what it measured, compared", async () => {
     await page.getByText("You control the rig.", { exact: true }).waitFor();
     await plan(page, "first", 2, 1);
     assert.match(await page.locator("#touch").innerText(), /Nothing was moved\./);
+    // What would be touched, and in which order, is seen before anything moves.
+    const drawn = page.locator(".planned");
+    await drawn.locator(".overlay text", { hasText: "mm" }).waitFor();
+    const planned = Number(/(\d+) planned/.exec(await drawn.innerText())[1]);
+    assert.match(await drawn.locator("output").innerText(), new RegExp(`^${planned} of ${planned}: touch \\d+$`));
+    assert.match(await drawn.innerText(), /Each dot is where one finger would meet the object/);
+    await drawn.locator("input[type=range]").fill("0");
+    assert.match(await drawn.locator("output").innerText(), new RegExp(`^1 of ${planned}: touch \\d+$`));
+    await drawn.scrollIntoViewIfNeeded();
+    await shot(page, "touch-planned");
     await shot(page, "touch-dry-run");
     assert.deepEqual(await violations(page), []);
     await agree(page, "Start \u2026");
@@ -145,6 +155,48 @@ test("control is asked for, handed over, and stays with a page that is loaded ag
     await other.reload();
     await other.getByText("You control the rig.", { exact: true }).waitFor();
     await other.close();
+  });
+});
+
+test("control of a page that is closed, or killed, is given back, but never while the arm is at work", async () => {
+  await served(browser, folder, ["--rig", address()], {}, async (page, server, said, url) => {
+    const controlling = async () => {
+      const other = await page.context().newPage();
+      await other.goto(url);
+      await button(other, "Take control").click();
+      await other.getByText("You control the rig.", { exact: true }).waitFor();
+      return other;
+    };
+    const closed = await controlling();
+    await page.getByText("page 2 controls the rig; you look on.").waitFor();
+    await page.getByText("Also here: page 2.").waitFor();
+    let began = performance.now();
+    await closed.close();
+    await page.getByText("page 2, which controlled the rig, went; its lease was given back").waitFor();
+    console.log(`control of a page that was closed is free after ${((performance.now() - began) / 1000).toFixed(1)} s`);
+    await button(page, "Take control").waitFor();
+    assert.equal(await page.locator(".rig-pages").count(), 0);
+
+    // Killed while it rests.
+    const killed = await controlling();
+    await killed.goto("chrome://crash").catch(() => undefined);
+    began = performance.now();
+    await page.getByText("page 3, which controlled the rig, went; its lease was given back").waitFor();
+    console.log(`control of a page that was killed is free after ${((performance.now() - began) / 1000).toFixed(1)} s`);
+
+    // Closed in the middle of a run: it ends first.
+    const left = await controlling();
+    await plan(left, "left", 6, 1);
+    await agree(left, "Start \u2026");
+    await touches(page, 1);
+    await left.close();
+    await page.locator("#touch").getByText(/page 4 controls the rig, but is gone: its lease is given back once this has ended/).waitFor();
+    await shot(page, "touch-gone");
+    await page.getByText("page 4, which controlled the rig, went; its lease was given back").waitFor();
+    const possible = Number(/(\d+) of \d+ touches possible/.exec(await page.locator("#touch").innerText())[1]);
+    await touches(page, possible);
+    await button(page, "Take control").waitFor();
+    assert.deepEqual(await violations(page), []);
   });
 });
 

@@ -59,7 +59,7 @@ try {
       console.log(`  ${name}: begins after ${at(of.map((one) => one[1]), 0.5).toFixed(0)} ms, takes ${words(of.map((one) => one[2] - one[1]))}`);
     }
     console.log(`  the first: ${all[0].parts.map(([name, from, to]) => `${name} ${from.toFixed(0)} to ${to.toFixed(0)} ms`).join(", ")}`);
-    const waits = await dragSlider(page, Array.from({ length: moves }, (_, k) => String(0.5 + 0.05 * ((k * 7) % 50))));
+    const waits = await dragSlider(page, "tip_radius", Array.from({ length: moves }, (_, k) => String(0.5 + 0.05 * ((k * 7) % 50))));
     console.log(`while it does not rest a new error: ${words(waits)}`);
   });
 } finally {

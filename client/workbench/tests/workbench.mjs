@@ -59,9 +59,9 @@ export const ready = (page, rungs) => page.waitForFunction((count) => {
 export const fits = (page) => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
 
 
-// A slider that gets a value each 20 ms and never rests, until as many errors were shown: milliseconds from one to the next.
-export const dragSlider = (page, values) => page.evaluate((values) => new Promise((done) => {
-  const slider = document.querySelector(".slider input");
+// The slider `name` gets a value each 20 ms and never rests, until as many errors were shown: milliseconds from one to the next.
+export const dragSlider = (page, name, values) => page.evaluate(([name, values]) => new Promise((done) => {
+  const slider = [...document.querySelectorAll(".slider")].find((one) => one.textContent.includes(name)).querySelector("input");
   const last = () => [...document.querySelectorAll(".live-rung")].at(-1).dataset.rmse;
   let shown = last();
   let since = performance.now();
@@ -82,4 +82,4 @@ export const dragSlider = (page, values) => page.evaluate((values) => new Promis
     done(waits);
   });
   watch.observe(document.querySelector(".live-main"), { subtree: true, attributes: true, childList: true });
-}), values);
+}), [name, values]);

@@ -30,16 +30,17 @@ export const moved = signal<Move | null>(null);
 
 let token = "";
 let evidence: Uint8Array = new Uint8Array(0);
+let sentAhead = false; // the evidence names a session, whose measurements were too large for a request
 let running = new AbortController();
 let drawing = new AbortController(); // of the views
 let saved = ""; // the model that was saved last
 export const byHand = "values by hand"; // the rung of the sliders
 
-const unavailable = 14; // grpc::StatusCode
+const invalidArgument = 3, notFound = 5, resourceExhausted = 8, unavailable = 14; // grpc::StatusCode
 
 async function local(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await request(`/local/${path}`, init, token);
-  if (!response.ok) throw new CallError(3, (await response.text()).trim());
+  if (!response.ok) throw new CallError(response.status === 503 ? unavailable : response.status === 413 ? resourceExhausted : invalidArgument, (await response.text()).trim());
   return response;
 }
 
@@ -63,12 +64,21 @@ async function doing(what: string, act: (signal: AbortSignal) => Promise<void>, 
 
 // Compare or Diagnose with this model; the report's bytes.
 async function ask(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
-  // A server that was lost in the middle: the workbench finds the next one, and the whole is asked again.
-  try { return await askOnce(method, yaml, signal); } catch (reason) {
-    if (!(reason instanceof CallError) || reason.code !== unavailable || signal.aborted) throw reason;
-    return askOnce(method, yaml, signal);
+  for (let left = maxRepairs; ; --left) {
+    try { return await askOnce(method, yaml, signal); } catch (reason) {
+      if (!(reason instanceof CallError) || signal.aborted || !left) throw reason;
+      // A server that was lost in the middle: the workbench finds the next one, and the whole is asked again.
+      if (reason.code === unavailable) continue;
+      // The server does not know what was sent ahead to the one before it, or to itself before it was started again.
+      if (reason.code !== notFound || !sentAhead) throw reason;
+      if (working.value) working.value = { ...working.value, stage: "sending the measurements again", done: 0 };
+      try { await local("send-ahead", { method: "POST", signal }); } catch (refused) {
+        throw refused instanceof CallError && refused.code === invalidArgument ? reason : refused; // a session of the server's own is gone
+      }
+    }
   }
 }
+const maxRepairs = 2; // a server that is lost, and one that lacks the measurements
 
 async function askOnce(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
   let report: Uint8Array | null = null;
@@ -168,8 +178,10 @@ async function reopen({ path, saved: before, rungs: steps }: Kept): Promise<void
 async function readEvidence(path: string, signal: AbortSignal): Promise<string> {
   evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
   opened = path;
+  sentAhead = false;
   let yaml = "";
   for (const { number, bytes } of fieldsOf(evidence)) {
+    if (number === 1) sentAhead = true;
     if (number === 7) origin.value = text(bytes);
     if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
   }
@@ -226,7 +238,7 @@ export function undo(): void {
 }
 
 export interface FormulaWords {
-  variables: { name: string; unit: string; meaning: string }[]; pixel_variables: { name: string }[];
+  variables: { name: string; unit: string; meaning: string }[]; pixel_variables: { name: string; unit: string; meaning: string }[];
   functions: { usage: string; meaning: string }[]; constants: { name: string; meaning: string }[]; units: string[];
 }
 export interface FormulaParameter { name: string; value: string; unit: string; min: string; max: string }
