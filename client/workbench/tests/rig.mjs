@@ -223,7 +223,7 @@ test("where a person changes the object the page asks, and the arm waits until s
   const control = JSON.parse(readFileSync(join(own, "rig", "emulator.json"), "utf8")).control.port;
   const hands = await started("touchstone-gateway", ["--config", config, "--listen", "127.0.0.1:0"], own);
   try {
-    await served(browser, own, ["--rig", hands.line.split(" ").pop()], { colorScheme: "dark" }, async (page) => {
+    await served(browser, own, ["--rig", hands.line.split(" ").pop()], { colorScheme: "dark" }, async (page, server, said, url) => {
       await button(page, "Take control").click();
       await page.getByText("You control the rig.", { exact: true }).waitFor();
       await plan(page, "hands", 1, 1);
@@ -234,8 +234,8 @@ test("where a person changes the object the page asks, and the arm waits until s
       await shot(page, "touch-asked");
       assert.deepEqual(await violations(page), []);
       const face = /face ([+-][xyz])/.exec(await asked.innerText())[1];
-      const said = spawnSync(join(dirname(program), "touchstone-rig-emulator"), ["tell", `127.0.0.1:${control}`, "mount", "lat20", face]);
-      assert.equal(said.status, 0, String(said.stderr));
+      const told = spawnSync(join(dirname(program), "touchstone-rig-emulator"), ["tell", `127.0.0.1:${control}`, "mount", "lat20", face]);
+      assert.equal(told.status, 0, String(told.stderr));
       await agree(page, "It lies there \u2026");
       await touches(page, 1);
       // The next face: Stop while the page asks ends the run.
@@ -243,6 +243,18 @@ test("where a person changes the object the page asks, and the arm waits until s
       await button(page, "Stop").click();
       await asked.filter({ hasText: "Stopped" }).waitFor();
       await page.waitForFunction(() => !document.querySelector(".rig-job"));
+      // Asked again, and the page that controls is closed: nobody can answer, so that the run ends and the lease goes back.
+      await page.getByLabel("Why may the rig move again?").fill("tried on purpose");
+      await button(page, "Release the stop").click();
+      await idle(page);
+      const other = await page.context().newPage();
+      await other.goto(url);
+      await other.getByText("page 1 controls the rig; you look on.").waitFor();
+      await agree(page, "Start again \u2026");
+      await asked.filter({ hasText: "Turn lat20" }).waitFor();
+      await page.close();
+      await other.getByText(/page 1, which controlled the rig, went while the rig waited for a person to do this: Turn lat20/).waitFor();
+      await button(other, "Take control").waitFor();
     });
   } finally {
     for (const one of [hands, rig]) { one.child.kill("SIGTERM"); await ended(one.child); }

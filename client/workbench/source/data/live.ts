@@ -3,6 +3,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import type { FormulaParameter } from "./formula";
 import { startRig } from "./rig";
 import { download } from "../charts/export";
 import { followHash, page, session } from "../state";
@@ -38,7 +39,7 @@ export const byHand = "values by hand"; // the rung of the sliders
 
 const invalidArgument = 3, notFound = 5, resourceExhausted = 8, unavailable = 14; // grpc::StatusCode
 
-async function local(path: string, init: RequestInit = {}): Promise<Response> {
+export async function local(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await request(`/local/${path}`, init, token);
   if (!response.ok) throw new CallError(response.status === 503 ? unavailable : response.status === 413 ? resourceExhausted : invalidArgument, (await response.text()).trim());
   return response;
@@ -236,15 +237,6 @@ export function undo(): void {
   stale.value = true;
   void doing("Back to the model before", compareLast);
 }
-
-export interface FormulaWords {
-  variables: { name: string; unit: string; meaning: string }[]; pixel_variables: { name: string; unit: string; meaning: string }[];
-  functions: { usage: string; meaning: string }[]; constants: { name: string; meaning: string }[]; units: string[];
-}
-export interface FormulaParameter { name: string; value: string; unit: string; min: string; max: string }
-export const formulaWords = async () => (await local("formula")).json() as Promise<FormulaWords>;
-export const namesIn = async (expression: string) =>
-  ((await (await local("formula", { method: "POST", body: JSON.stringify({ expression }) })).json()) as { names: { name: string }[] }).names.map((one) => one.name);
 
 // What is wrong with it, or nothing: then it is in the model.
 export async function addFormula(name: string, adds: string, expression: string, parameters: FormulaParameter[]): Promise<string> {

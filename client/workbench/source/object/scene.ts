@@ -210,6 +210,15 @@ export class ObjectScene {
     return this.canvas.toDataURL();
   }
 
+  // Onto another canvas, which keeps it: what WebGL has drawn is gone once the browser has shown it.
+  copyTo(other: HTMLCanvasElement): void {
+    if (!this.canvas.clientWidth) return;
+    this.resize(this.canvas.clientWidth, this.canvas.clientHeight);
+    this.drawNow();
+    Object.assign(other, { width: this.canvas.width, height: this.canvas.height });
+    other.getContext("2d")!.drawImage(this.canvas, 0, 0);
+  }
+
   draw(): void {
     if (this.waiting) return;
     this.waiting = requestAnimationFrame(() => { this.waiting = 0; this.drawNow(); });

@@ -1,6 +1,7 @@
 // The picture of an object, and what a person does with it: turn it, come nearer, point at a dot, pick one.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { tickText } from "../charts/scale";
+import { onPrint } from "../print";
 import { ObjectScene } from "./scene";
 
 // A length that is round and at most 110 px.
@@ -66,7 +67,10 @@ export function Stage({ many, label, labels, onScene, describe, onPick, onEnter 
     observer.observe(made.canvas);
     setScene(made);
     onScene(made);
-    return () => { observer.disconnect(); made.dispose(); onScene(null); };
+    const paper = document.createElement("canvas");
+    paper.className = "paper";
+    const printed = onPrint({ draw: () => { made.copyTo(paper); made.canvas.after(paper); }, after: () => paper.remove() });
+    return () => { printed(); observer.disconnect(); made.dispose(); onScene(null); };
   }, []);
   const place = (event: PointerEvent | MouseEvent): [number, number] => { const box = canvas.current!.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
   const down = (event: PointerEvent) => { drag.current = { held: [event.clientX, event.clientY], moved: 0 }; canvas.current!.setPointerCapture(event.pointerId); scene?.hold(true); };

@@ -1,6 +1,7 @@
 // An effect of one's own: a formula, the variables that it may use, and its errors where they are.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { type FormulaParameter, type FormulaWords, addFormula, formulaWords, namesIn, working } from "../data/live";
+import { type FormulaParameter, type FormulaWords, formulaWords, namesIn } from "../data/formula";
+import { addFormula, working } from "../data/live";
 import { page, touches } from "../state";
 import { isPictures, typeset } from "../format";
 
