@@ -64,8 +64,7 @@ nlohmann::json Pages::List(Time now, const std::string& also) const {
   nlohmann::json list = nlohmann::json::object();
   for (const auto& [id, page] : pages_) {
     const bool there = now < page.until;
-    if (there || id == also)
-      list[id] = {{"number", page.number}, {"hidden", page.hidden}, {"there", there}};
+    if (there || id == also) list[id] = {{"number", page.number}, {"hidden", page.hidden}, {"there", there}};
   }
   return list;
 }

@@ -18,7 +18,8 @@ class Pages {
 
   struct Said {
     bool hidden = false;  // its tab is not the one that is seen
-    bool begins = true;   // false: what it says while it is there, which may arrive after its goodbye and then counts for nothing
+    bool begins =
+        true;  // false: what it says while it is there, which may arrive after its goodbye and then counts for nothing
   };
   // `page` says that it is there. True in `changed` where others should hear of it. RESOURCE_EXHAUSTED: there are 1000 already.
   absl::Status Hear(const std::string& page, const Said& said, Time now, bool* changed);

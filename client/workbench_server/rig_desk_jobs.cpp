@@ -99,9 +99,10 @@ absl::Status RigDesk::AskPerson(const std::string& words) {
   asked_.clear();
   if (stopping_ || ending_) return absl::CancelledError("stopped");
   if (answered) return absl::OkStatus();
-  return absl::AbortedError(absl::StrCat(
-      pages_.Name(controller_), ", which controlled the rig, went while the rig waited for a person to do this: ",
-      words, ". Start the same plan again: touches that are made are not made again"));
+  return absl::AbortedError(
+      absl::StrCat(pages_.Name(controller_),
+                   ", which controlled the rig, went while the rig waited for a person to do this: ", words,
+                   ". Start the same plan again: touches that are made are not made again"));
 }
 
 absl::StatusOr<std::string> RigDesk::Stop(const std::string& request) {

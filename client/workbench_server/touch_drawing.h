@@ -20,7 +20,8 @@ using ObjectsOfSource = std::map<std::string, v1::Object>;
 //  "setups": [{"object": entry, "up_face", "touches": [TOUCH ..]}], "impossible": [TOUCH with "object": entry and "reason" ..]}, TOUCH:
 // {"touch", "target_mm", "approach", "lateral", "standoff_mm", "path_mm": x y z of each point in turn}. At most 2000 touches, evenly.
 // A mesh is there where it is one of the built-in shapes; low_mm and high_mm are the object's box.
-nlohmann::json DrawTouches(const std::vector<client::PlannedRow>& rows, const std::vector<v1::TouchCheck>& checks,
+nlohmann::json DrawTouches(const std::vector<client::PlannedRow>& rows,
+                           const std::vector<v1::TouchCheck>& checks,
                            const std::vector<client::RigGroup>& setups, const ObjectsOfSource& objects);
 
 }  // namespace touchstone::workbench

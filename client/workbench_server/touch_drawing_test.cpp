@@ -48,7 +48,8 @@ v1::Object Served(const std::string& name, uint64_t triangles) {
 TEST(TouchDrawing, HasEveryTouchInTheOrderInWhichTheRigMakesItWithItsPathInTheObjectsFrame) {
   const std::vector<client::PlannedRow> rows = {Row(1, "lat10"), Row(2, "lat10", false), Row(3, "lat10")};
   const std::vector<client::RigGroup> setups = {{"lat10", "+z", {2, 0}, 1}};
-  const json drawn = DrawTouches(rows, {Check(), Check(), Check()}, setups, {{"lat10", Served("lat10", 2000)}});
+  const json drawn =
+      DrawTouches(rows, {Check(), Check(), Check()}, setups, {{"lat10", Served("lat10", 2000)}});
   EXPECT_EQ(drawn["touches"], 3);
   const json& touches = drawn["setups"][0]["touches"];
   ASSERT_EQ(touches.size(), 2u);

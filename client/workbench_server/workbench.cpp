@@ -145,7 +145,8 @@ absl::StatusOr<std::string> Workbench::Local(const HttpRequest& request, std::st
   }
   if (is(http::verb::post, "/local/send-ahead")) {
     if (!options_.send_ahead_again)
-      return absl::FailedPreconditionError("/local/send-ahead: the evidence is whole, nothing was sent ahead");
+      return absl::FailedPreconditionError(
+          "/local/send-ahead: the evidence is whole, nothing was sent ahead");
     TOUCHSTONE_RETURN_IF_ERROR(options_.send_ahead_again(upstream_->server().channel));
     return std::string("{}");
   }

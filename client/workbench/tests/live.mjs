@@ -160,6 +160,7 @@ test("an effect that no catalogue has, as a formula", async () => {
     assert.ok(better < 0.5 * given, `${given} -> ${better}`);
     await timeOfSlider(page, "screw", 0, 2);
     await ready(page, 3);
+    assert.ok((await errors(page))[2] > 2 * better, `${await errors(page)}`);
     await page.getByRole("button", { name: "Undo" }).click();
     await page.getByRole("button", { name: "Undo" }).click();
     await ready(page, 1);
@@ -266,8 +267,10 @@ test("a formula over the pixels of photographs", async () => {
     await ready(page, 2);
     const [given, better] = await errors(page);
     assert.ok(better < 0.5 * given, `${given} -> ${better}`);
+    assert.match(await page.locator(".live h2").innerText(), /photos \u00b7/);
     await timeOfSlider(page, "glare", 0, 2);
     await ready(page, 3);
+    assert.ok(Math.abs((await errors(page))[2] - given) < 0.1 * given, `${await errors(page)}`); // without its size nothing is left of it
     await shot(page, "photographs");
     said.length = 0; // chromium itself tells of the answer 400 to an expression with an error
   });

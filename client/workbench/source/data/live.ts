@@ -180,11 +180,14 @@ async function readEvidence(path: string, signal: AbortSignal): Promise<string> 
   evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
   opened = path;
   sentAhead = false;
-  let yaml = "";
+  let yaml = "", measured = false;
   for (const { number, bytes } of fieldsOf(evidence)) {
     if (number === 1) sentAhead = true;
+    if (number === 1 || number === 2 || number === 8) measured = true;
     if (number === 7) origin.value = text(bytes);
     if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
+    // Photographs alone have a name of their own; they come last.
+    if (number === 9 && !measured) for (const part of fieldsOf(bytes)) if (part.number === 4) origin.value = text(part.bytes);
   }
   return yaml;
 }

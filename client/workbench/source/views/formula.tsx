@@ -72,7 +72,7 @@ export function Formula() {
       <summary>Add an effect of your own: a formula</summary>
       <form onSubmit={(event) => void add(event)}>
         <div class="row">
-          <label>Name <input value={name} required pattern="[A-Za-z][A-Za-z0-9_]*" title="Letters, digits and _, a letter first" placeholder="lead_screw" onInput={(event) => setName(event.currentTarget.value)} /></label>
+          <label>Name <input value={name} required pattern="[A-Za-z][A-Za-z0-9_]*" title="Letters, digits and _, a letter first" placeholder={to === "grey" ? "glare" : "lead_screw"} onInput={(event) => setName(event.currentTarget.value)} /></label>
           <label>It adds to the <select value={to} onChange={(event) => setTo(event.currentTarget.value)}>{Object.entries(adds).map(([key, title]) => <option value={key}>{title}</option>)}</select></label>
         </div>
         <label>Formula <textarea ref={box} rows={2} value={text} required spellcheck={false} aria-invalid={!!fault} placeholder={to === "grey" ? "k * radius^2" : "k * sin(2*pi*travel_mm/lead)"} onInput={(event) => setText(event.currentTarget.value)} /></label>

@@ -115,7 +115,8 @@ function Slider({ effect, parameter, entry }: { effect: ModelEffect; parameter: 
   const range = useRef<[number, number] | null>(null);
   if (!range.current || value < range.current[0] || value > range.current[1]) {
     const near = Math.max(4 * Math.abs(one.typical - one.neutral), 1.5 * Math.abs(value - one.neutral));
-    range.current = [Math.max(one.lower, one.neutral - near), Math.min(one.upper, one.neutral + near)];
+    // A formula's own parameter has no typical size: its bounds are what its author gave.
+    range.current = near > 0 ? [Math.max(one.lower, one.neutral - near), Math.min(one.upper, one.neutral + near)] : [one.lower, one.upper];
   }
   const [low, high] = range.current;
   return (
