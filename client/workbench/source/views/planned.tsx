@@ -75,7 +75,7 @@ function PlannedScene({ drawing }: { drawing: PlanDrawing }) {
 
   useEffect(() => {
     if (!scene) return;
-    const [pale, deep, wrong, path, ink] = ["--axis", "--better", "--given", "--axis", "--ink"].map(rgbOf);
+    const [pale, deep, wrong, path, ink] = ["--paper", "--better", "--given", "--axis", "--ink"].map(rgbOf);
     const positions = Float32Array.from(planned.flatMap((one) => one.contacts.flat()));
     const colours = Uint8Array.from(planned.flatMap((one, i) => one.contacts.flatMap(() => (one.possible ? mixed(pale, deep, possible > 1 ? i / (possible - 1) : 1) : wrong))));
     // What is made up to the chosen one stands out.
@@ -103,7 +103,7 @@ function PlannedScene({ drawing }: { drawing: PlanDrawing }) {
         describe={(dot) => describe(planned[Math.floor(dot / (fingers ?? 3))])} onPick={(dot) => { if (dot >= 0) setAt(Math.floor(dot / (fingers ?? 3))); }} onEnter={() => setAt((at + 1) % planned.length)} />
       <label class="planned-order">Order <input type="range" min={0} max={planned.length - 1} value={at} aria-valuetext={chosen && describe(chosen)} onInput={(event) => setAt(Number(event.currentTarget.value))} /> <output>{chosen && describe(chosen)}</output></label>
       <figcaption>
-        {object.triangles.length ? "Each dot is where one finger would meet the object" : "Each dot is where one finger aims; the mesh is not here, and its box is drawn"}: grey comes first, blue last. {planned.length > possible && "Orange: the rig cannot make it. "}The line is the way of the tip up to the chosen touch, as the gateway checked it; way and order start where the rig stands now.
+        {object.triangles.length ? "Each dot is where one finger would meet the object" : "Each dot is where one finger aims; the mesh is not here, and its box is drawn"}; first <span class="order-key" aria-hidden="true" /> last. {planned.length > possible && "Orange: the rig cannot make it. "}The line is the way of the tip up to the chosen touch, as the gateway checked it; way and order start where the rig stands now.
         {drawing.touches > drawing.setups.reduce((sum, one) => sum + one.touches.length, drawing.impossible.length) && ` Of ${count(drawing.touches)} touches an even sample is drawn.`}
       </figcaption>
     </figure>
