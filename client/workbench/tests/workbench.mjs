@@ -60,7 +60,8 @@ export const fits = (page) => page.evaluate(() => document.documentElement.scrol
 
 
 // The slider `name` gets a value each 20 ms and never rests, until as many errors were shown: milliseconds from one to the next.
-export const dragSlider = (page, name, values) => page.evaluate(([name, values]) => new Promise((done) => {
+export const dragSlider = (page, name, values) => page.evaluate(([name, values]) => new Promise((done, failed) => {
+  setTimeout(() => failed(new Error(`${waits.length} of ${values.length} errors were shown within 30 s`)), 30000);
   const slider = [...document.querySelectorAll(".slider")].find((one) => one.textContent.includes(name)).querySelector("input");
   const last = () => [...document.querySelectorAll(".live-rung")].at(-1).dataset.rmse;
   let shown = last();

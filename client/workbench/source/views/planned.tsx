@@ -5,7 +5,7 @@ import { type DrawnTouch, type PlanDrawing, desk, planDrawing } from "../data/ri
 import { count } from "../format";
 import { refined } from "../object/paint";
 import { firstHit } from "../object/ray";
-import { type Line, type ObjectScene, type Rod, movingPoints } from "../object/scene";
+import { type Line, type ObjectScene, type Rod, type View, movingPoints } from "../object/scene";
 import { Stage, imageOf, overlayOf } from "../object/stage";
 import { Tools } from "../parts/tools";
 import { theme } from "../state";
@@ -28,6 +28,13 @@ function contactsOf(touch: DrawnTouch, fingers: number, spacingMm: number, mesh:
 function boxEdges([x0, y0, z0]: number[], [x1, y1, z1]: number[]): number[] {
   const corner = (i: number) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
   return Array.from({ length: 8 }, (_, i) => [1, 2, 4].filter((bit) => !(i & bit)).flatMap((bit) => [...corner(i), ...corner(i | bit)])).flat();
+}
+
+// From beside the way that most touches come, so near that their beginnings are seen.
+function viewOf(planned: Planned[]): View {
+  const [x, y, z] = [0, 1, 2].map((k) => -planned.reduce((sum, one) => sum + one.touch.approach[k], 0) / planned.length);
+  const level = Math.hypot(x, y);
+  return { azimuth: level > 0.3 ? Math.atan2(y, x) + 0.5 : 0.9, elevation: 0.7 * Math.atan2(z, level) + 0.3, zoom: 0.72 };
 }
 
 const pairs = (path: number[]) => Array.from({ length: Math.max(0, path.length / 3 - 1) }, (_, i) => path.slice(3 * i, 3 * i + 6)).flat();
@@ -70,8 +77,8 @@ function PlannedScene({ drawing }: { drawing: PlanDrawing }) {
     scene.setMesh(mesh, Float32Array.from(box.length ? box : planned.flatMap((one) => one.contacts.flat())));
     const solid = rgbOf("--solid");
     if (mesh) scene.paint(Uint8Array.from(mesh.positions, (_, i) => solid[i % 3]));
-    scene.view.zoom = 0.72; // the beginnings of the approaches are seen
   }, [scene, object, night, theme.value]);
+  useEffect(() => { if (scene) { scene.view = viewOf(planned); scene.draw(); } }, [scene, planned]);
 
   useEffect(() => {
     if (!scene) return;
