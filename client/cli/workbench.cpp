@@ -57,6 +57,9 @@ absl::Status RunWorkbench(const Cli& cli, const WorkbenchFlags& options) {
     TOUCHSTONE_ASSIGN_OR_RETURN(comparison, Comparison::Open(cli, options));
     TOUCHSTONE_RETURN_IF_ERROR(comparison->SendAheadNow());
     served.evidence = comparison->evidence();
+    served.send_ahead_again = [&comparison](const std::shared_ptr<grpc::Channel>& server) {
+      return comparison->SendAheadAgain(server);
+    };
     TOUCHSTONE_RETURN_IF_ERROR(NameModel(&comparison->connection(), &*served.evidence));
   }
   served.port = options.port;

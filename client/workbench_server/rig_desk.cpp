@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "server/base/printable.h"
@@ -12,7 +13,7 @@
 namespace touchstone::workbench {
 namespace {
 
-constexpr size_t kMaxPageId = 64, kMaxPages = 1000;
+constexpr size_t kMaxPageId = 64;
 
 bool IsPageId(const std::string& text) {
   return !text.empty() && text.size() <= kMaxPageId &&
@@ -31,12 +32,12 @@ absl::StatusOr<std::unique_ptr<RigDesk>> RigDesk::Open(std::unique_ptr<client::C
                      " source, which has no rig; a touchstone-gateway was expected"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::ListObjectsResponse served,
                               rig->Call(&v1::Source::Stub::ListObjects, v1::ListObjectsRequest()));
-  std::vector<std::string> objects;
-  for (const v1::Object& object : served.objects()) objects.push_back(object.name());
+  ObjectsOfSource objects;
+  for (const v1::Object& object : served.objects()) objects[object.name()] = object;
   return std::unique_ptr<RigDesk>(new RigDesk(std::move(rig), std::move(objects), std::move(log)));
 }
 
-RigDesk::RigDesk(std::unique_ptr<client::Connection> rig, std::vector<std::string> objects,
+RigDesk::RigDesk(std::unique_ptr<client::Connection> rig, ObjectsOfSource objects,
                  std::function<void(const std::string&)> log)
     : rig_(std::move(rig)),
       address_(rig_->address()),
@@ -66,28 +67,31 @@ RigDesk::~RigDesk() {
   source_.reset();
 }
 
-std::string RigDesk::Named(const std::string& page) const {
-  const auto found = pages_.find(page);
-  return absl::StrCat("page ", found == pages_.end() ? 0 : found->second);
-}
-
 absl::Status RigDesk::Act(const std::string& request) {
   const Json parsed = Json::parse(request, nullptr, /*allow_exceptions=*/false);
   if (!parsed.is_object()) return absl::InvalidArgumentError("an act is a JSON object");
   absl::Status status;
+  bool changed = true;
   try {
-    const std::string page = parsed.at("page");
+    const std::string page = parsed.at("page"), act = parsed.at("act");
     if (!IsPageId(page))
       return absl::InvalidArgumentError("page: 1 to 64 letters, digits and dashes were expected");
+    const auto now = std::chrono::steady_clock::now();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (pages_.count(page) == 0 && pages_.size() >= kMaxPages)
-      return absl::ResourceExhaustedError("there were 1000 pages; start touchstone workbench again");
-    pages_.emplace(page, static_cast<int>(pages_.size()) + 1);
-    status = ActLocked(page, parsed.at("act"), parsed);
+    if (act == "bye") {
+      pages_.SayGoodbye(page, now);
+      return absl::OkStatus();
+    }
+    const Pages::Said said{parsed.value("hidden", false), act != "hello" || parsed.value("begins", false)};
+    TOUCHSTONE_RETURN_IF_ERROR(pages_.Hear(page, said, now, &changed));
+    if (act != "hello") {
+      status = ActLocked(page, act, parsed);
+      changed = true;
+    }
   } catch (const Json::exception& error) {
     return absl::InvalidArgumentError(absl::StrCat("an act of the page: ", error.what()));
   }
-  Changed();
+  if (changed) Changed();
   return status;
 }
 
@@ -95,7 +99,7 @@ absl::Status RigDesk::CheckControls(const std::string& page) const {
   if (controller_ == page && source_ != nullptr) return absl::OkStatus();
   return absl::FailedPreconditionError(
       controller_.empty() ? std::string("no page controls the rig; take control first")
-                          : absl::StrCat(Named(controller_), " controls the rig; ask it for control"));
+                          : absl::StrCat(pages_.Name(controller_), " controls the rig; ask it for control"));
 }
 
 absl::Status RigDesk::CheckConfirmed(const Json& request) const {
@@ -115,7 +119,6 @@ absl::Status RigDesk::BeginJob(std::string name, bool moves, std::function<absl:
 }
 
 absl::Status RigDesk::ActLocked(const std::string& page, const std::string& act, const Json& request) {
-  if (act == "hello") return absl::OkStatus();
   if (act == "acquire" || act == "take_lease") {
     if (!controller_.empty() && controller_ != page) return CheckControls(page);
     if (source_ != nullptr) return absl::OkStatus();
@@ -136,7 +139,7 @@ absl::Status RigDesk::ActLocked(const std::string& page, const std::string& act,
       };
       absl::StatusOr<std::unique_ptr<TouchRun>> checked;
       try {
-        checked = TouchRun::Check(rig_.get(), plan, go_on);
+        checked = TouchRun::Check(rig_.get(), plan, objects_, go_on);
       } catch (const Json::exception& error) {
         return absl::InvalidArgumentError(absl::StrCat("the plan: ", error.what()));
       }
@@ -196,11 +199,12 @@ absl::Status RigDesk::Between(const std::string& page, const std::string& act, c
         "control does not change hands while the rig is at work (", job_.name, "); stop it, or wait"));
   if (act == "release") return BeginJob("giving the lease back", false, [this] { return Drop(); });
   const std::string to = act == "take" ? page : request.at("to").get<std::string>();
-  if (pages_.count(to) == 0) return absl::NotFoundError("to: there is no such page");
+  if (!pages_.IsThere(to, std::chrono::steady_clock::now()))
+    return absl::NotFoundError("that page is not there any more");
   controller_ = to;
   requests_.clear();
   last_error_.clear();
-  last_text_ = absl::StrCat(Named(to), " controls the rig now");
+  last_text_ = absl::StrCat(pages_.Name(to), " controls the rig now");
   return absl::OkStatus();
 }
 

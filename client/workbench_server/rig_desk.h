@@ -1,11 +1,11 @@
 // The rig behind the page's view Touch: which page controls it, its lease, its dry runs and its runs, and what every page sees
 // of them. One page controls, the others look on; every page may stop the rig. Nothing moves without an act of the page that
-// controls, which says that a person has agreed ("confirmed": true).
+// controls, which says that a person has agreed ("confirmed": true). Where that page goes, the lease is given back as soon as the
+// rig is at rest: what it has begun ends first, but for a wait for a person, which ends the run.
 #pragma once
 
 #include <condition_variable>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/source/leased_source.h"
+#include "client/workbench_server/pages.h"
 #include "client/workbench_server/touch_run.h"
 #include "client/workbench_server/watchers.h"
 #include "touchstone/v1/diagnosis.pb.h"
@@ -33,7 +34,8 @@ class RigDesk {
 
   // One act of a page, JSON {"page": ID, "act": NAME, ...}, ID of 1 to 64 letters, digits and dashes. OK: it is done or begun;
   // what becomes of it is seen by Watch. FAILED_PRECONDITION: not this page, or not now.
-  //   hello                                  is counted among the pages
+  //   hello (hidden, begins)                 is there; said every two seconds, and where its tab comes into sight or goes
+  //   bye                                    is closed, or loaded again
   //   acquire, take_lease                    control and the rig's lease; take_lease: from whoever holds it, unless the rig is moving
   //   request, decline, give (to), release   control between pages; never while a run or a motion is under way
   //   take                                   control from another page; not while something moves
@@ -48,6 +50,8 @@ class RigDesk {
   // What the run's session has measured so far, as the gateway's journal has it, with a model that has no effect.
   absl::StatusOr<v1::Evidence> Evidence();
   absl::StatusOr<std::string> SetCsv();
+  // Of the last dry run, {"check", and what DrawTouches has}.
+  absl::StatusOr<std::string> Drawing() const;
   const std::string& address() const { return address_; }
 
  private:
@@ -57,7 +61,7 @@ class RigDesk {
     bool moves = false;
     std::function<absl::Status()> run;
   };
-  RigDesk(std::unique_ptr<client::Connection> rig, std::vector<std::string> objects,
+  RigDesk(std::unique_ptr<client::Connection> rig, ObjectsOfSource objects,
           std::function<void(const std::string&)> log);
 
   absl::Status ActLocked(const std::string& page, const std::string& act, const Json& request);
@@ -65,7 +69,8 @@ class RigDesk {
   absl::Status CheckControls(const std::string& page) const;
   absl::Status CheckConfirmed(const Json& request) const;
   absl::Status BeginJob(std::string name, bool moves, std::function<absl::Status()> run);
-  std::string Named(const std::string& page) const;  // "page 2"
+  bool ControllerWent() const;
+  void GiveUpControlOfGonePage();  // with the lock
 
   // On the worker's thread, without the lock.
   absl::Status Acquire(const std::string& page, bool take);
@@ -82,7 +87,7 @@ class RigDesk {
 
   const std::unique_ptr<client::Connection> rig_;  // the worker's
   const std::string address_;
-  const std::vector<std::string> objects_;
+  const ObjectsOfSource objects_;
   const std::function<void(const std::string&)> log_;
   // Of the connection as it was opened, which finds the same address again by itself; safe from every thread.
   const std::unique_ptr<v1::Control::Stub> control_;
@@ -93,7 +98,7 @@ class RigDesk {
   std::mutex publishing_;     // states are published in the order in which they were true
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
-  std::map<std::string, int> pages_;  // numbers, in the order in which they came
+  Pages pages_;
   std::string controller_;
   std::vector<std::string> requests_;
   std::unique_ptr<client::LeasedSource> source_;  // while a page controls; changed by the worker alone

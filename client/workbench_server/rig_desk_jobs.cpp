@@ -38,7 +38,7 @@ absl::Status RigDesk::Acquire(const std::string& page, bool take) {
   source_ = *std::move(source);
   controller_ = page;
   requests_.clear();
-  last_text_ = absl::StrCat(Named(page), " controls the rig");
+  last_text_ = absl::StrCat(pages_.Name(page), " controls the rig");
   return absl::OkStatus();
 }
 
@@ -94,10 +94,15 @@ absl::Status RigDesk::AskPerson(const std::string& words) {
   }
   Changed();
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return asked_.empty() || stopping_ || ending_; });
+  changed_.wait(lock, [this] { return asked_.empty() || stopping_ || ending_ || ControllerWent(); });
+  const bool answered = asked_.empty();
   asked_.clear();
   if (stopping_ || ending_) return absl::CancelledError("stopped");
-  return absl::OkStatus();
+  if (answered) return absl::OkStatus();
+  return absl::AbortedError(
+      absl::StrCat(pages_.Name(controller_),
+                   ", which controlled the rig, went while the rig waited for a person to do this: ", words,
+                   ". Start the same plan again: touches that are made are not made again"));
 }
 
 absl::StatusOr<std::string> RigDesk::Stop(const std::string& request) {

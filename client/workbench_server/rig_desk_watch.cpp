@@ -1,6 +1,7 @@
 // What the desk looks at, and what every page sees of it.
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -90,13 +91,40 @@ void RigDesk::Look() {
         return absl::AbortedError(why);
       }).IgnoreError();
     }
-    if (news) {
+    GiveUpControlOfGonePage();
+    const auto there = std::chrono::steady_clock::now();
+    const bool went = pages_.Went(there);
+    if (went)
+      requests_.erase(std::remove_if(requests_.begin(), requests_.end(),
+                                     [&](const std::string& page) { return !pages_.IsThere(page, there); }),
+                      requests_.end());
+    if (went || news) {
       lock.unlock();
       Changed();
       lock.lock();
     }
     changed_.wait_for(lock, kLookEvery, [this] { return ending_; });
   }
+}
+
+bool RigDesk::ControllerWent() const {
+  return source_ != nullptr && !controller_.empty() &&
+         !pages_.IsThere(controller_, std::chrono::steady_clock::now());
+}
+
+// Never while something moves or is under way; a run that waits for a person ends by itself.
+void RigDesk::GiveUpControlOfGonePage() {
+  if (!ControllerWent()) return;
+  if (!asked_.empty()) changed_.notify_all();
+  if (!job_.name.empty() || moving_) return;
+  const std::string error = last_error_;  // of what it had begun
+  BeginJob("giving the lease back", false, [this, error, page = pages_.Name(controller_)] {
+    const absl::Status dropped = Drop();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    last_error_ = error;
+    last_text_ = absl::StrCat(page, ", which controlled the rig, went; its lease was given back");
+    return dropped;
+  }).IgnoreError();
 }
 
 void RigDesk::Work() {
@@ -121,14 +149,22 @@ void RigDesk::Work() {
   }
 }
 
+absl::StatusOr<std::string> RigDesk::Drawing() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (run_ == nullptr) return absl::FailedPreconditionError("no dry run was made yet");
+  json drawing = run_->drawing();
+  drawing["check"] = check_;
+  return drawing.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 std::string RigDesk::StateText() const {
-  json pages = json::object();
-  for (const auto& [id, number] : pages_) pages[id] = number;
+  std::vector<std::string> objects;
+  for (const auto& [name, object] : objects_) objects.push_back(name);
   json state = {{"rig", rig_json_},
                 {"address", address_},
-                {"objects", objects_},
+                {"objects", objects},
                 {"beat", beat_},
-                {"pages", pages},
+                {"pages", pages_.List(std::chrono::steady_clock::now(), controller_)},
                 {"controller", controller_},
                 {"leased", source_ != nullptr},
                 {"requests", requests_},

@@ -57,6 +57,7 @@ json TouchJson(const client::PlannedRow& row, const v1::TouchResult& result) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TouchRun>> TouchRun::Check(client::Connection* rig, const json& plan,
+                                                          const ObjectsOfSource& objects,
                                                           const std::function<bool()>& go_on) {
   auto run = std::make_unique<TouchRun>();
   run->session_ = plan.at("session").get<std::string>();
@@ -74,14 +75,19 @@ absl::StatusOr<std::unique_ptr<TouchRun>> TouchRun::Check(client::Connection* ri
   TOUCHSTONE_ASSIGN_OR_RETURN(run->rows_, client::RowsOf(touches, run->session_, run->origin_));
   std::vector<size_t> all(run->rows_.size());
   std::iota(all.begin(), all.end(), size_t{0});
-  TOUCHSTONE_RETURN_IF_ERROR(client::CheckRows(rig, all, &run->rows_, nullptr, go_on));
+  std::vector<v1::TouchCheck> checks;
+  TOUCHSTONE_RETURN_IF_ERROR(client::CheckRows(rig, all, &run->rows_, &checks, go_on));
   TOUCHSTONE_ASSIGN_OR_RETURN(const v1::RigState state,
                               rig->CallOnce(&v1::Rig::Stub::GetRig, v1::GetRigRequest()));
-  run->Summarize(state);
+  const std::vector<client::RigGroup> setups = client::GroupRows(
+      run->rows_, [&](size_t row) { return run->rows_[row].possible; }, state.object(),
+      client::UpFaceWord(state.up_face()));
+  run->Summarize(setups);
+  run->drawing_ = DrawTouches(run->rows_, checks, setups, objects);
   return run;
 }
 
-void TouchRun::Summarize(const v1::RigState& state) {
+void TouchRun::Summarize(const std::vector<client::RigGroup>& setups) {
   size_t possible = 0;
   double duration_s = 0;
   json groups = json::array(), impossible = json::array(), notes = json::array();
@@ -94,9 +100,7 @@ void TouchRun::Summarize(const v1::RigState& state) {
       if (notes.size() < kMaxReasonsShown)
         notes.push_back(absl::StrCat("Touch ", row.touch.touch, ": ", note));
   }
-  for (const client::RigGroup& group : client::GroupRows(
-           rows_, [this](size_t row) { return rows_[row].possible; }, state.object(),
-           client::UpFaceWord(state.up_face()))) {
+  for (const client::RigGroup& group : setups) {
     groups.push_back({{"object", group.object},
                       {"up_face", group.up_face},
                       {"touches", group.rows.size()},

@@ -11,6 +11,7 @@
 
 #include "client/source/leased_source.h"
 #include "client/source/rig_plan.h"
+#include "client/workbench_server/touch_drawing.h"
 
 namespace touchstone::workbench {
 
@@ -30,6 +31,7 @@ class TouchRun {
  public:
   // Expands and checks; moves nothing, needs no lease. INVALID_ARGUMENT says what is wrong with the plan.
   static absl::StatusOr<std::unique_ptr<TouchRun>> Check(client::Connection* rig, const nlohmann::json& plan,
+                                                         const ObjectsOfSource& objects,
                                                          const std::function<bool()>& go_on);
 
   // Makes the touches that are possible; those that the rig has made under this session are answered from its journal.
@@ -41,13 +43,15 @@ class TouchRun {
   // "impossible": [{"touch", "object", "reason"}], "notes": [..]}: what the dry run found.
   const nlohmann::json& checked() const { return checked_; }
   const std::string& session() const { return session_; }
+  // What it would touch, touch_drawing.h.
+  const nlohmann::json& drawing() const { return drawing_; }
 
  private:
-  void Summarize(const v1::RigState& state);
+  void Summarize(const std::vector<client::RigGroup>& setups);
 
   std::string session_, origin_;
   std::vector<client::PlannedRow> rows_;
-  nlohmann::json checked_;
+  nlohmann::json checked_, drawing_;
 };
 
 }  // namespace touchstone::workbench

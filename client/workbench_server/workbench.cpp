@@ -108,6 +108,7 @@ absl::StatusOr<std::string> Workbench::OfRig(const HttpRequest& request, std::st
     TOUCHSTONE_RETURN_IF_ERROR(desk_->Act(request.body()));
     return std::string("{}");
   }
+  if (!post && request.target() == "/local/rig/drawing") return desk_->Drawing();
   *type = kBytes;
   if (!post && request.target() == "/local/rig/set.csv") return desk_->SetCsv();
   if (!post && request.target() == "/local/evidence?rig") {
@@ -141,6 +142,13 @@ absl::StatusOr<std::string> Workbench::Local(const HttpRequest& request, std::st
     *type = kBytes;
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Evidence example, ExampleEvidence());
     return example.SerializeAsString();
+  }
+  if (is(http::verb::post, "/local/send-ahead")) {
+    if (!options_.send_ahead_again)
+      return absl::FailedPreconditionError(
+          "/local/send-ahead: the evidence is whole, nothing was sent ahead");
+    TOUCHSTONE_RETURN_IF_ERROR(options_.send_ahead_again(upstream_->server().channel));
+    return std::string("{}");
   }
   if (is(http::verb::post, "/local/words")) {
     v1::Report report;

@@ -2,16 +2,19 @@
 //   GET  /                 the page
 //   GET  /local/state      JSON: whether there is evidence, and whom the page asks
 //   GET  /local/evidence   the evidence of the command line, or with ?example that of example.h (touchstone.v1.Evidence)
+//   POST /local/send-ahead sends the evidence's measurements again, where they went ahead as a session that the server lacks
 //   POST /local/words      touchstone.v1.Report -> what --html puts into its page
 //   POST /local/model      model_edit.h
 //   GET  /local/formula    JSON: what a formula may use; POST: the names in an expression, model_edit.h
 //   GET  /local/watch, POST /local/rig, POST /local/stop   the rig of --rig, rig_desk.h
 //   GET  /local/evidence?rig, /local/rig/set.csv           what its run has measured so far
+//   GET  /local/rig/drawing                                what its dry run would touch, touch_drawing.h
 //   POST /touchstone.v1.Service/Method   gRPC-Web
 // A second port answers POST /local/stop alone, with {"token", ...} as text: browsers open six connections to a port, and a stop
 // waits for none of them.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +35,9 @@ struct WorkbenchOptions {
   std::function<void(const std::string&)> log = [](const std::string&) {
   };                                     // of the rig's stops and losses, for people
   std::optional<v1::Evidence> evidence;  // with the model as text
+  // Sends to this server the session that `evidence` names, which it does not have any more; called from several threads.
+  // Unset: the evidence is whole.
+  std::function<absl::Status(const std::shared_ptr<grpc::Channel>& server)> send_ahead_again;
   HttpLimits limits;
 };
 

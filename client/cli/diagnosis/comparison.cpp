@@ -262,14 +262,31 @@ absl::Status Comparison::AddImages(v1::ImageSetFiles images) {
 }
 
 absl::Status Comparison::SendAhead() {
-  const std::string& csv = csv_to_send_ahead_;
-  if (csv.empty()) return absl::OkStatus();
+  if (csv_to_send_ahead_.empty()) return absl::OkStatus();
   std::random_device random;
   const std::string name = absl::StrCat("sent-ahead-", absl::Hex(random()), absl::Hex(random()));
   grpc::ClientContext context;
   const Interrupt::Handler handler([&context] { context.TryCancel(); });
+  TOUCHSTONE_RETURN_IF_ERROR(SendSession(&connection_->sessions(), name, &context));
+  sent_ahead_ = name;
+  evidence_.set_session(name);
+  return absl::OkStatus();
+}
+
+absl::Status Comparison::SendAheadAgain(const std::shared_ptr<grpc::Channel>& server) const {
+  if (sent_ahead_.empty())
+    return absl::FailedPreconditionError("nothing was sent ahead: the measurements are in each request");
+  const auto sessions = v1::Sessions::NewStub(server);
+  grpc::ClientContext context;
+  const absl::Status sent = SendSession(sessions.get(), sent_ahead_, &context);
+  return absl::IsAlreadyExists(sent) ? absl::OkStatus() : sent;
+}
+
+absl::Status Comparison::SendSession(v1::Sessions::StubInterface* sessions, const std::string& name,
+                                     grpc::ClientContext* context) const {
+  const std::string& csv = csv_to_send_ahead_;
   v1::Session session;
-  const auto writer = connection_->sessions().CreateSession(&context, &session);
+  const auto writer = sessions->CreateSession(context, &session);
   v1::CreateSessionRequest request;
   request.set_name(name);
   for (size_t begin = 0; begin < csv.size(); begin += kPiece) {
@@ -279,15 +296,11 @@ absl::Status Comparison::SendAhead() {
   }
   writer->WritesDone();
   const absl::Status status = client::FromGrpc(writer->Finish());
-  if (!status.ok()) {
-    // The server knows the set by the passing name only.
-    std::string message(status.message());
-    if (absl::StartsWith(message, name)) message = evidence_.origin() + message.substr(name.size());
-    return absl::Status(status.code(), message);
-  }
-  sent_ahead_ = name;
-  evidence_.set_session(name);
-  return absl::OkStatus();
+  if (status.ok()) return status;
+  // The server knows the set by the passing name only.
+  std::string message(status.message());
+  if (absl::StartsWith(message, name)) message = evidence_.origin() + message.substr(name.size());
+  return absl::Status(status.code(), message);
 }
 
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {

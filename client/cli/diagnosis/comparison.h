@@ -70,6 +70,10 @@ class Comparison {
   // Sends what Run would send ahead, so that evidence() is whole. Run does it by itself.
   absl::Status SendAheadNow() { return sent_ahead_.empty() ? SendAhead() : absl::OkStatus(); }
 
+  // To a server that does not have it (any more), under the same name. From any thread, once SendAheadNow has returned.
+  // FAILED_PRECONDITION: nothing was sent ahead.
+  absl::Status SendAheadAgain(const std::shared_ptr<grpc::Channel>& server) const;
+
   // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it. A lost server
   // is replaced by the next one, which begins anew.
   template <typename Response, typename Start>
@@ -88,6 +92,8 @@ class Comparison {
   absl::Status AddImages(v1::ImageSetFiles images);
   // What is too large for one request goes ahead as a session, once to each server that is asked.
   absl::Status SendAhead();
+  absl::Status SendSession(v1::Sessions::StubInterface* sessions, const std::string& name,
+                           grpc::ClientContext* context) const;
   template <typename Response, typename Start>
   absl::StatusOr<v1::Report> Attempt(const Start& start, ProgressBar* bar);
 

@@ -1,6 +1,6 @@
 // The page: the verdict first, then the ladder and what to do, then the evidence for it.
 import { useEffect } from "preact/hooks";
-import { page, theme, walk, clearFilters } from "./state";
+import { page, theme, touches, walk, walkPictures, clearFilters } from "./state";
 import { Baseline } from "./views/baseline";
 import { Histograms } from "./views/compare";
 import { Explore } from "./views/explore";
@@ -31,13 +31,14 @@ function Navigation() {
   return <nav aria-label="Parts of the page"><ul>{links.filter(([id]) => there[id]).map(([id, text]) => <li><button type="button" class="link" onClick={() => document.getElementById(id)?.scrollIntoView({ behavior: "smooth" })}>{text}</button></li>)}</ul></nav>;
 }
 
-// [ and ] go through the touches from wherever the keyboard is, unless it types.
+// [ and ] go through the touches, or else the photographs, from wherever the keyboard is, unless it types.
 function useKeys() {
   useEffect(() => {
     const act = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test((event.target as HTMLElement).tagName)) return;
-      if (event.key === "]") walk(1);
-      else if (event.key === "[") walk(-1);
+      const go = touches.value ? walk : walkPictures;
+      if (event.key === "]") go(1);
+      else if (event.key === "[") go(-1);
       else if (event.key === "Escape") clearFilters();
     };
     addEventListener("keydown", act);

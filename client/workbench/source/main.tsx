@@ -2,12 +2,15 @@ import { render } from "preact";
 import { App, LiveApp } from "./app";
 import { startLive } from "./data/live";
 import { FileSource, isLive } from "./data/load";
+import { followPrint } from "./print";
 import { followHash, page } from "./state";
 import "./style.css";
+import "./print.css";
 
 const place = document.getElementById("page")!;
 
 async function start(): Promise<void> {
+  followPrint();
   if (isLive()) {
     document.title = "Touchstone workbench";
     place.replaceChildren();

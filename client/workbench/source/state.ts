@@ -94,8 +94,20 @@ export function walk(by: number): void {
   selectTouch(list[at < 0 ? (by > 0 ? 0 : list.length - 1) : (at + by + list.length) % list.length]);
 }
 
+// Of the photographs that are shown, the worst first.
+export const rankedPictures = computed(() =>
+  shownData.value.flatMap((data) => data.photographs?.photographs ?? []).filter((one) => object.value === null || one.object === object.value).sort((a, b) => b.rmse - a.rmse));
+
+// Where there are photographs alone, they are what is gone through.
+export function walkPictures(by: number): void {
+  const list = rankedPictures.value.map((one) => one.image);
+  if (!list.length) return;
+  const at = picture.value === null ? -1 : list.indexOf(picture.value);
+  picture.value = list[at < 0 ? (by > 0 ? 0 : list.length - 1) : (at + by + list.length) % list.length];
+}
+
 export function clearFilters(): void {
-  slice.value = object.value = finger.value = touch.value = null;
+  slice.value = object.value = finger.value = touch.value = picture.value = null;
 }
 
 export const parity = "parity";

@@ -142,6 +142,23 @@ test("photographs stand beside what was rendered and what is left", async () => 
   }, { name: "photographs" });
 });
 
+test("photographs are gone through with keys, and filtered by object, as touches are", async () => {
+  const list = [...photographs.report.data[0].photographs.photographs].sort((a, b) => b.rmse - a.rmse);
+  const { image, object } = list[0];
+  await opened(photographs, async (page) => {
+    await page.keyboard.press("]");
+    await page.waitForFunction((wanted) => new URLSearchParams(location.hash.slice(1)).get("picture") === wanted, image);
+    assert.equal(await page.locator("#photographs tr.chosen button").innerText(), image);
+    await page.locator("#detail .groups").getByRole("button", { name: object, exact: true }).click();
+    const own = list.filter((one) => one.object === object).length;
+    await page.getByText(`${own} of ${list.length} pictures: those of ${object}.`).waitFor();
+    assert.equal(await page.locator("#photographs .photos").count(), photographs.report.data[0].photographs.maps.filter((map) => map.object === object).length);
+    await page.keyboard.press("Escape");
+    await page.waitForFunction(() => !location.hash.includes("="));
+    assert.equal(await page.locator("#photographs tr.chosen").count(), 0);
+  }, { name: "photographs-keys" });
+});
+
 test("names of people are text, wherever they stand", async () => {
   const evil = "</script><img src=x onerror=alert(1)><script>alert(2)</script>\"'";
   const data = structuredClone(touches);
@@ -200,6 +217,43 @@ test("the page of several sessions names what changed, and charts every value wi
     assert.equal(await part.getByRole("button", { name: "2026-11-04.csv" }).getAttribute("aria-pressed"), "true");
     assert.deepEqual(await violations(page), []);
   }, { name: "sessions" });
+});
+
+test("a printed page is light, as wide as paper, and loses no view", async () => {
+  for (const [data, name, views] of [[touches, "touches", ["ladder", "todo", "where", "touches", "why", "power", "detail", "histograms", "data"]], [photographs, "photographs", ["ladder", "photographs", "why", "detail"]], [sessions, "sessions", ["sessions", "touches", "histograms"]]])
+    await opened(data, async (page) => {
+      if (name === "touches") await page.waitForSelector(".overlay");
+      await page.emulateMedia({ media: "print", colorScheme: "dark" });
+      // The browser takes its picture as soon as this event has been heard.
+      const printed = await page.evaluate(() => {
+        dispatchEvent(new Event("beforeprint"));
+        const main = document.querySelector("main").getBoundingClientRect();
+        const wide = [...document.querySelectorAll("main svg, main img, main table, main canvas")].filter((one) => {
+          const box = one.getBoundingClientRect();
+          const within = (one.closest("figure.plot, figure.control, figure.table") ?? one.parentElement).getBoundingClientRect();
+          return box.width > 0 && (box.left < main.left - 1 || box.right > main.right + 1 || box.right > within.right + 1);
+        });
+        const paper = document.querySelector("canvas.paper");
+        const pixels = paper ? paper.getContext("2d").getImageData(0, 0, paper.width, paper.height).data : [];
+        let drawn = 0, light = 0;
+        for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3]) { ++drawn; light += pixels[i] + pixels[i + 1] + pixels[i + 2] > 384 ? 1 : 0; }
+        return {
+          background: getComputedStyle(document.body).backgroundColor, width: main.width, folded: document.querySelectorAll("main details:not([open])").length,
+          views: [...document.querySelectorAll("main section")].filter((one) => one.getBoundingClientRect().height > 40).map((one) => one.id),
+          wide: wide.map((one) => one.outerHTML.slice(0, 160)), drawn: paper ? drawn / (pixels.length / 4) : 1, light: paper ? light / drawn : 1,
+        };
+      });
+      assert.equal(printed.background, "rgb(255, 255, 255)");
+      assert.ok(printed.width <= 696, `${printed.width} px`);
+      assert.equal(printed.folded, 0);
+      assert.deepEqual(views.filter((view) => !printed.views.includes(view)), []);
+      assert.deepEqual(printed.wide, []);
+      assert.ok(printed.drawn > 0.05 && printed.light > 0.6, `${printed.drawn} of the object is drawn, ${printed.light} of that light`);
+      await page.evaluate(() => dispatchEvent(new Event("afterprint")));
+      await page.emulateMedia({ media: "screen", colorScheme: "dark" });
+      await page.waitForFunction(() => getComputedStyle(document.body).backgroundColor !== "rgb(255, 255, 255)" && document.querySelectorAll("main details:not([open])").length > 0);
+      if (shots) await page.pdf({ path: join(shots, `${name}.pdf`), printBackground: true });
+    }, { scheme: "dark", name: `print-${name}` });
 });
 
 test("axe finds nothing, in light and in dark", async () => {

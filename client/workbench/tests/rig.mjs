@@ -61,6 +61,16 @@ test("a plan, its dry run, a run, and what it measured, compared", async () => {
     await page.getByText("You control the rig.", { exact: true }).waitFor();
     await plan(page, "first", 2, 1);
     assert.match(await page.locator("#touch").innerText(), /Nothing was moved\./);
+    // What would be touched, and in which order, is seen before anything moves.
+    const drawn = page.locator(".planned");
+    await drawn.locator(".overlay text", { hasText: "mm" }).waitFor();
+    const planned = Number(/(\d+) planned/.exec(await drawn.innerText())[1]);
+    assert.match(await drawn.locator("output").innerText(), new RegExp(`^${planned} of ${planned}: touch \\d+$`));
+    assert.match(await drawn.innerText(), /Each dot is where one finger would meet the object/);
+    await drawn.locator("input[type=range]").fill("0");
+    assert.match(await drawn.locator("output").innerText(), new RegExp(`^1 of ${planned}: touch \\d+$`));
+    await drawn.scrollIntoViewIfNeeded();
+    await shot(page, "touch-planned");
     await shot(page, "touch-dry-run");
     assert.deepEqual(await violations(page), []);
     await agree(page, "Start \u2026");
@@ -148,6 +158,48 @@ test("control is asked for, handed over, and stays with a page that is loaded ag
   });
 });
 
+test("control of a page that is closed, or killed, is given back, but never while the arm is at work", async () => {
+  await served(browser, folder, ["--rig", address()], {}, async (page, server, said, url) => {
+    const controlling = async () => {
+      const other = await page.context().newPage();
+      await other.goto(url);
+      await button(other, "Take control").click();
+      await other.getByText("You control the rig.", { exact: true }).waitFor();
+      return other;
+    };
+    const closed = await controlling();
+    await page.getByText("page 2 controls the rig; you look on.").waitFor();
+    await page.getByText("Also here: page 2.").waitFor();
+    let began = performance.now();
+    await closed.close();
+    await page.getByText("page 2, which controlled the rig, went; its lease was given back").waitFor();
+    console.log(`control of a page that was closed is free after ${((performance.now() - began) / 1000).toFixed(1)} s`);
+    await button(page, "Take control").waitFor();
+    assert.equal(await page.locator(".rig-pages").count(), 0);
+
+    // Killed while it rests.
+    const killed = await controlling();
+    await killed.goto("chrome://crash").catch(() => undefined);
+    began = performance.now();
+    await page.getByText("page 3, which controlled the rig, went; its lease was given back").waitFor();
+    console.log(`control of a page that was killed is free after ${((performance.now() - began) / 1000).toFixed(1)} s`);
+
+    // Closed in the middle of a run: it ends first.
+    const left = await controlling();
+    await plan(left, "left", 6, 1);
+    await agree(left, "Start \u2026");
+    await touches(page, 1);
+    await left.close();
+    await page.locator("#touch").getByText(/page 4 controls the rig, but is gone: its lease is given back once this has ended/).waitFor();
+    await shot(page, "touch-gone");
+    await page.getByText("page 4, which controlled the rig, went; its lease was given back").waitFor();
+    const possible = Number(/(\d+) of \d+ touches possible/.exec(await page.locator("#touch").innerText())[1]);
+    await touches(page, possible);
+    await button(page, "Take control").waitFor();
+    assert.deepEqual(await violations(page), []);
+  });
+});
+
 test("the lease of another program is taken on purpose alone, and its page says who took it", async () => {
   await served(browser, folder, ["--rig", address()], {}, async (page) => {
     await button(page, "Take control").click();
@@ -171,7 +223,7 @@ test("where a person changes the object the page asks, and the arm waits until s
   const control = JSON.parse(readFileSync(join(own, "rig", "emulator.json"), "utf8")).control.port;
   const hands = await started("touchstone-gateway", ["--config", config, "--listen", "127.0.0.1:0"], own);
   try {
-    await served(browser, own, ["--rig", hands.line.split(" ").pop()], { colorScheme: "dark" }, async (page) => {
+    await served(browser, own, ["--rig", hands.line.split(" ").pop()], { colorScheme: "dark" }, async (page, server, said, url) => {
       await button(page, "Take control").click();
       await page.getByText("You control the rig.", { exact: true }).waitFor();
       await plan(page, "hands", 1, 1);
@@ -182,8 +234,8 @@ test("where a person changes the object the page asks, and the arm waits until s
       await shot(page, "touch-asked");
       assert.deepEqual(await violations(page), []);
       const face = /face ([+-][xyz])/.exec(await asked.innerText())[1];
-      const said = spawnSync(join(dirname(program), "touchstone-rig-emulator"), ["tell", `127.0.0.1:${control}`, "mount", "lat20", face]);
-      assert.equal(said.status, 0, String(said.stderr));
+      const told = spawnSync(join(dirname(program), "touchstone-rig-emulator"), ["tell", `127.0.0.1:${control}`, "mount", "lat20", face]);
+      assert.equal(told.status, 0, String(told.stderr));
       await agree(page, "It lies there \u2026");
       await touches(page, 1);
       // The next face: Stop while the page asks ends the run.
@@ -191,6 +243,18 @@ test("where a person changes the object the page asks, and the arm waits until s
       await button(page, "Stop").click();
       await asked.filter({ hasText: "Stopped" }).waitFor();
       await page.waitForFunction(() => !document.querySelector(".rig-job"));
+      // Asked again, and the page that controls is closed: nobody can answer, so that the run ends and the lease goes back.
+      await page.getByLabel("Why may the rig move again?").fill("tried on purpose");
+      await button(page, "Release the stop").click();
+      await idle(page);
+      const other = await page.context().newPage();
+      await other.goto(url);
+      await other.getByText("page 1 controls the rig; you look on.").waitFor();
+      await agree(page, "Start again \u2026");
+      await asked.filter({ hasText: "Turn lat20" }).waitFor();
+      await page.close();
+      await other.getByText(/page 1, which controlled the rig, went while the rig waited for a person to do this: Turn lat20/).waitFor();
+      await button(other, "Take control").waitFor();
     });
   } finally {
     for (const one of [hands, rig]) { one.child.kill("SIGTERM"); await ended(one.child); }

@@ -58,3 +58,29 @@ export const ready = (page, rungs) => page.waitForFunction((count) => {
 }, rungs);
 export const fits = (page) => page.evaluate(() => document.documentElement.scrollWidth <= innerWidth);
 
+
+// The slider `name` gets a value each 20 ms and never rests, until as many errors were shown: milliseconds from one to the next.
+export const dragSlider = (page, name, values) => page.evaluate(([name, values]) => new Promise((done, failed) => {
+  setTimeout(() => failed(new Error(`${waits.length} of ${values.length} errors were shown within 30 s`)), 30000);
+  const slider = [...document.querySelectorAll(".slider")].find((one) => one.textContent.includes(name)).querySelector("input");
+  const last = () => [...document.querySelectorAll(".live-rung")].at(-1).dataset.rmse;
+  let shown = last();
+  let since = performance.now();
+  const waits = [];
+  let next = 0;
+  const timer = setInterval(() => {
+    slider.value = values[next++ % values.length];
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+  }, 20);
+  const watch = new MutationObserver(() => {
+    if (["NaN", shown].includes(last())) return;
+    shown = last();
+    waits.push(performance.now() - since);
+    since = performance.now();
+    if (waits.length < values.length) return;
+    watch.disconnect();
+    clearInterval(timer);
+    done(waits);
+  });
+  watch.observe(document.querySelector(".live-main"), { subtree: true, attributes: true, childList: true });
+}), [name, values]);

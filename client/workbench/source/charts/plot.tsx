@@ -1,6 +1,7 @@
 // A chart with two axes: lines, steps, whiskers and dots as SVG, a cloud of points on a canvas beneath.
 import { type ComponentChildren } from "preact";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { onPrint } from "../print";
 import { theme } from "../state";
 import { Tools } from "../parts/tools";
 import { type Cloud, type Frame, cloudSvg, drawCloud, nearest } from "./cloud";
@@ -32,10 +33,13 @@ const margin = { left: 52, right: 12, top: 10, bottom: 40 };
 function useWidth(): [(element: HTMLDivElement | null) => void, number] {
   const [width, setWidth] = useState(0);
   const observer = useRef<ResizeObserver | null>(null);
+  const printed = useRef<(() => void) | null>(null);
   const attach = useRef((element: HTMLDivElement | null) => {
     observer.current?.disconnect();
+    printed.current?.();
     if (!element) return;
     setWidth(element.clientWidth);
+    printed.current = onPrint({ measure: () => setWidth(element.clientWidth) });
     observer.current = new ResizeObserver(() => setWidth(element.clientWidth));
     observer.current.observe(element);
   });

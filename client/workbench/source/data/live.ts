@@ -3,6 +3,7 @@ import { computed, effect, signal } from "@preact/signals";
 import type { Report } from "./report";
 import { parsePageData } from "./load";
 import { CallError, Disconnected, call, double, field, fieldsOf, joined, request, text } from "./wire";
+import type { FormulaParameter } from "./formula";
 import { startRig } from "./rig";
 import { download } from "../charts/export";
 import { followHash, page, session } from "../state";
@@ -30,16 +31,17 @@ export const moved = signal<Move | null>(null);
 
 let token = "";
 let evidence: Uint8Array = new Uint8Array(0);
+let sentAhead = false; // the evidence names a session, whose measurements were too large for a request
 let running = new AbortController();
 let drawing = new AbortController(); // of the views
 let saved = ""; // the model that was saved last
 export const byHand = "values by hand"; // the rung of the sliders
 
-const unavailable = 14; // grpc::StatusCode
+const invalidArgument = 3, notFound = 5, resourceExhausted = 8, unavailable = 14; // grpc::StatusCode
 
-async function local(path: string, init: RequestInit = {}): Promise<Response> {
+export async function local(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await request(`/local/${path}`, init, token);
-  if (!response.ok) throw new CallError(3, (await response.text()).trim());
+  if (!response.ok) throw new CallError(response.status === 503 ? unavailable : response.status === 413 ? resourceExhausted : invalidArgument, (await response.text()).trim());
   return response;
 }
 
@@ -63,12 +65,21 @@ async function doing(what: string, act: (signal: AbortSignal) => Promise<void>, 
 
 // Compare or Diagnose with this model; the report's bytes.
 async function ask(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
-  // A server that was lost in the middle: the workbench finds the next one, and the whole is asked again.
-  try { return await askOnce(method, yaml, signal); } catch (reason) {
-    if (!(reason instanceof CallError) || reason.code !== unavailable || signal.aborted) throw reason;
-    return askOnce(method, yaml, signal);
+  for (let left = maxRepairs; ; --left) {
+    try { return await askOnce(method, yaml, signal); } catch (reason) {
+      if (!(reason instanceof CallError) || signal.aborted || !left) throw reason;
+      // A server that was lost in the middle: the workbench finds the next one, and the whole is asked again.
+      if (reason.code === unavailable) continue;
+      // The server does not know what was sent ahead to the one before it, or to itself before it was started again.
+      if (reason.code !== notFound || !sentAhead) throw reason;
+      if (working.value) working.value = { ...working.value, stage: "sending the measurements again", done: 0 };
+      try { await local("send-ahead", { method: "POST", signal }); } catch (refused) {
+        throw refused instanceof CallError && refused.code === invalidArgument ? reason : refused; // a session of the server's own is gone
+      }
+    }
   }
 }
+const maxRepairs = 2; // a server that is lost, and one that lacks the measurements
 
 async function askOnce(method: string, yaml: string, signal: AbortSignal): Promise<Uint8Array> {
   let report: Uint8Array | null = null;
@@ -95,16 +106,19 @@ function errorIn(report: Uint8Array, entry: number): number {
   return rmse ? double(rmse) : quality ? 0 : Number.NaN;
 }
 
-// The report of the last rung: its error at once, the views after the browser has painted it, unless a slider has moved on.
-async function show(report: Uint8Array, signal: AbortSignal): Promise<Report | null> {
+// The report of the last rung: its error at once, the views once the browser has painted it and no slider has moved for `restMs`:
+// to draw them takes longer than to compare, and a slider that moves on would wait for it.
+async function show(report: Uint8Array, signal: AbortSignal, restMs = 0): Promise<Report | null> {
   const setError = (entry: number) => {
     const rmse = errorIn(report, entry);
     rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
   };
   setError(page.value?.words.main ?? 0);
+  if (moved.value) return null; // a slider's next value waits already
   const mine = (drawing = new AbortController());
   try {
     await painted();
+    if (restMs) await rest(restMs, mine.signal);
     const data = parsePageData(await (await local("words", { method: "POST", body: report as BodyInit, signal: AbortSignal.any([signal, mine.signal]) })).text());
     signal.throwIfAborted();
     mine.signal.throwIfAborted();
@@ -125,11 +139,18 @@ const painted = () => new Promise<void>((done) => {
   requestAnimationFrame(() => setTimeout(done));
 });
 
+const rest = (ms: number, signal: AbortSignal) => new Promise<void>((done, moved) => {
+  const timer = setTimeout(done, ms);
+  signal.addEventListener("abort", () => { clearTimeout(timer); moved(signal.reason as Error); }, { once: true });
+  if (signal.aborted) { clearTimeout(timer); moved(signal.reason as Error); }
+});
+const sliderRestMs = 150; // a hand that drags a slider says something every frame
+
 async function change(of: Record<string, unknown>): Promise<Model> {
   return (await local("model", { method: "POST", body: JSON.stringify(of) })).json() as Promise<Model>;
 }
 
-const compareLast = async (signal: AbortSignal) => { await show(await ask("Compare", model.value!.yaml, signal), signal); };
+const compareLast = async (signal: AbortSignal, restMs = 0) => { await show(await ask("Compare", model.value!.yaml, signal), signal, restMs); };
 
 // What a reload of the page needs: where the measurements came from, and the model with its steps.
 interface Kept { token: string; path: string; saved: string; rungs: { name: string; yaml: string; rmse: number | null }[] }
@@ -158,10 +179,15 @@ async function reopen({ path, saved: before, rungs: steps }: Kept): Promise<void
 async function readEvidence(path: string, signal: AbortSignal): Promise<string> {
   evidence = new Uint8Array(await (await local(path, { signal })).arrayBuffer());
   opened = path;
-  let yaml = "";
+  sentAhead = false;
+  let yaml = "", measured = false;
   for (const { number, bytes } of fieldsOf(evidence)) {
+    if (number === 1) sentAhead = true;
+    if (number === 1 || number === 2 || number === 8) measured = true;
     if (number === 7) origin.value = text(bytes);
     if (number === 3) for (const part of fieldsOf(bytes)) if (part.number === 3) yaml = text(part.bytes);
+    // Photographs alone have a name of their own; they come last.
+    if (number === 9 && !measured) for (const part of fieldsOf(bytes)) if (part.number === 4) origin.value = text(part.bytes);
   }
   return yaml;
 }
@@ -215,15 +241,6 @@ export function undo(): void {
   void doing("Back to the model before", compareLast);
 }
 
-export interface FormulaWords {
-  variables: { name: string; unit: string; meaning: string }[]; pixel_variables: { name: string }[];
-  functions: { usage: string; meaning: string }[]; constants: { name: string; meaning: string }[]; units: string[];
-}
-export interface FormulaParameter { name: string; value: string; unit: string; min: string; max: string }
-export const formulaWords = async () => (await local("formula")).json() as Promise<FormulaWords>;
-export const namesIn = async (expression: string) =>
-  ((await (await local("formula", { method: "POST", body: JSON.stringify({ expression }) })).json()) as { names: { name: string }[] }).names.map((one) => one.name);
-
 // What is wrong with it, or nothing: then it is in the model.
 export async function addFormula(name: string, adds: string, expression: string, parameters: FormulaParameter[]): Promise<string> {
   const assignments = [`name=${name}`, `adds=${adds}`, `expression=${expression}`,
@@ -239,15 +256,14 @@ export async function addFormula(name: string, adds: string, expression: string,
 // A slider's value. Values that come while one is compared wait, and the last of them is the next: the error follows a slider
 // that moves all the time. All of them are one rung, which Undo takes away.
 export function setValue(move: Move): void {
-  const idle = !moved.value;
   moved.value = move;
   drawing.abort();
-  if (!idle && working.value?.what === byHand) return;
+  if (working.value?.what === byHand) return; // the comparison under way ends, else a hand that moves on would see no error
   stale.value = true;
   void doing(byHand, async (signal) => {
     do {
       if (moved.value) await takeValue(moved.value, signal);
-      await compareLast(signal);
+      await compareLast(signal, sliderRestMs);
     } while (moved.value);
   });
 }

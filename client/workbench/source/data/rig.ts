@@ -5,15 +5,21 @@ import { CallError, request } from "./wire";
 export interface Rig {
   answers: boolean; state: string; stop_reason: string; lease_holder: string; moving: boolean; object: string; up_face: string; mounts_itself: boolean;
   arm: string; powered: boolean; phase: string; tip_mm: [number, number, number]; effector: string; pressed: boolean[]; last_error: string; emulated: boolean;
-  safety_notice: string; fingers: number; max_speed_mm_s: number; min_speed_mm_s: number;
+  safety_notice: string; fingers: number; max_speed_mm_s: number; min_speed_mm_s: number; spacing_m: number;
 }
 export interface Group { object: string; up_face: string; touches: number; duration_s: number }
 export interface Checked {
   session: string; origin: string; touches: number; possible: number; duration_s: number; groups: Group[];
   impossible: { touch: number; object: string; reason: string }[]; notes: string[];
 }
+// touch_drawing.h; object frame, mm.
+export interface DrawnTouch { touch: number; target_mm: number[]; approach: number[]; lateral: number[]; standoff_mm: number; path_mm: number[] }
+export interface PlanDrawing {
+  check: number; touches: number; objects: { name: string; low_mm?: number[]; high_mm?: number[]; vertices_mm: number[]; triangles: number[] }[];
+  setups: { object: number; up_face: string; touches: DrawnTouch[] }[]; impossible: (DrawnTouch & { object: number; reason: string })[];
+}
 export interface Desk {
-  rig: Partial<Rig>; address: string; objects: string[]; pages: Record<string, number>; controller: string; leased: boolean; requests: string[];
+  rig: Partial<Rig>; address: string; objects: string[]; pages: Record<string, { number: number; hidden: boolean; there: boolean }>; controller: string; leased: boolean; requests: string[];
   job: string; job_moves: boolean; stopping: boolean; ask: string; ask_id: number; check: number; checked: Checked | null; done: number; error: string; text: string;
 }
 export interface Touched { touch: number; object: string; up_face: string; times_us: (number | null)[] }
@@ -36,9 +42,13 @@ const me = (() => {
 })();
 
 export const controls = computed(() => desk.value?.controller === me && desk.value.leased);
-export const pageName = (id: string) => (id === me ? "this page" : `page ${desk.value?.pages[id] ?? "?"}`);
+export const pageName = (id: string) => (id === me ? "this page" : `page ${desk.value?.pages[id]?.number ?? "?"}`);
+// The other pages that are there, and whether somebody sees them.
+export const otherPages = computed(() => Object.entries(desk.value?.pages ?? {}).filter(([id, page]) => id !== me && page.there).map(([, page]) => page).sort((a, b) => a.number - b.number));
+export const controllerWent = computed(() => desk.value?.pages[desk.value.controller]?.there === false);
 export const asksAlready = computed(() => desk.value?.requests.includes(me) ?? false);
 
+const heardEveryMs = 2000; // this page says that it is there: pages.cpp
 const silentAfterMs = 3000; // the workbench says something every second
 const againAfterMs = 1000;
 const stopAnswerMs = 5000; // then a person must know that nothing answered
@@ -117,7 +127,7 @@ function follow(): void {
 export async function act(name: string, more: Record<string, unknown> = {}): Promise<boolean> {
   refused.value = "";
   try {
-    const response = await request("/local/rig", { method: "POST", body: JSON.stringify({ page: me, act: name, ...more }) }, token);
+    const response = await request("/local/rig", { method: "POST", body: JSON.stringify({ page: me, act: name, hidden: document.hidden, ...more }) }, token);
     if (!response.ok) throw new CallError(9, (await response.text()).trim());
     return true;
   } catch (reason) {
@@ -151,15 +161,28 @@ export async function stop(): Promise<void> {
   }
 }
 
-export async function measuredCsv(): Promise<string> {
-  const response = await request("/local/rig/set.csv", {}, token);
+async function ofRig(what: string): Promise<Response> {
+  const response = await request(`/local/rig/${what}`, {}, token);
   if (!response.ok) throw new CallError(9, (await response.text()).trim());
-  return response.text();
+  return response;
 }
+export const measuredCsv = async () => (await ofRig("set.csv")).text();
+export const planDrawing = async () => (await ofRig("drawing")).json() as Promise<PlanDrawing>;
 
 export function startRig(key: string, port: number): void {
   token = key;
   stopPort = port;
-  void act("hello");
+  stayPresent();
   follow();
+}
+
+// The workbench knows which pages there are: the rig's lease does not stay with one that is closed, or was killed.
+function stayPresent(): void {
+  const say = (name: "hello" | "bye", begins = false) =>
+    void request("/local/rig", { method: "POST", body: JSON.stringify({ page: me, act: name, hidden: document.hidden, begins }), keepalive: true }, token).catch(() => undefined);
+  say("hello", /*begins=*/true);
+  setInterval(() => say("hello"), heardEveryMs);
+  document.addEventListener("visibilitychange", () => say("hello"));
+  addEventListener("pageshow", (event) => { if (event.persisted) say("hello", /*begins=*/true); });
+  addEventListener("pagehide", () => say("bye"));
 }

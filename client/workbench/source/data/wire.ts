@@ -96,15 +96,17 @@ export async function call(method: string, message: Uint8Array, token: string, s
   if (!response.ok) throw new CallError(7, (await response.text()).trim());
   if (response.headers.has("x-touchstone-server")) answeredBy(response.headers.get("x-touchstone-server")!);
   if (response.headers.has("grpc-status")) return throwUnlessOk(response.headers.get("grpc-status"), response.headers.get("grpc-message"));
+  let trailers: Map<string, string> | null = null;
   try {
+    // To the end, behind the trailers too: an answer that is left before it keeps its connection.
     for await (const { flags, content } of frames(response.body!)) {
-      if (!(flags & 0x80)) { take(content); continue; }
-      const trailers = new Map(text(content).split("\r\n").map((line) => [line.slice(0, line.indexOf(":")).toLowerCase(), line.slice(line.indexOf(":") + 1).trim()]));
-      return throwUnlessOk(trailers.get("grpc-status"), trailers.get("grpc-message"));
+      if (flags & 0x80) trailers = new Map(text(content).split("\r\n").map((line) => [line.slice(0, line.indexOf(":")).toLowerCase(), line.slice(line.indexOf(":") + 1).trim()]));
+      else take(content);
     }
   } catch (reason) {
     if (reason instanceof TypeError) throw new Disconnected("touchstone workbench ended in the middle of an answer");
     throw reason;
   }
-  throw new Disconnected("the answer ended without a status");
+  if (!trailers) throw new Disconnected("the answer ended without a status");
+  throwUnlessOk(trailers.get("grpc-status"), trailers.get("grpc-message"));
 }

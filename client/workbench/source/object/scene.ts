@@ -1,6 +1,6 @@
 // One object with its contacts in WebGL. It draws when something has changed, not all the time.
 import {
-  BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, Group, HemisphereLight, Mesh as ThreeMesh, MeshLambertMaterial,
+  BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, Group, HemisphereLight, LineBasicMaterial, LineSegments, Mesh as ThreeMesh, MeshLambertMaterial,
   OrthographicCamera, Points, Raycaster, Scene as ThreeScene, ShaderMaterial, SphereGeometry, SRGBColorSpace, Vector3, WebGLRenderer,
 } from "three";
 import type { RGB } from "../colour";
@@ -8,6 +8,7 @@ import type { Mesh } from "./paint";
 
 export interface Contacts { positions: Float32Array; colours: Uint8Array; shown: Uint8Array }
 export interface Rod { from: number[]; to: number[]; colour: RGB; width: number; tip?: "ball" | "cone"; tipColour?: RGB }
+export interface Line { points: number[]; colour: RGB } // pairs of x, y, z
 export interface View { azimuth: number; elevation: number; zoom: number }
 
 const manyPoints = 30000; // beyond this they are squares of few pixels
@@ -35,6 +36,7 @@ export class ObjectScene {
   private readonly camera = new OrthographicCamera();
   private readonly light = new DirectionalLight(0xffffff, 1.9);
   private readonly rods = new Group();
+  private readonly lines = new Group();
   private readonly material = new MeshLambertMaterial({ vertexColors: true, flatShading: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
   private readonly dots = new ShaderMaterial({
     uniforms: { size: { value: 8 }, bias: { value: 0 }, round: { value: 1 } },
@@ -69,7 +71,7 @@ export class ObjectScene {
   constructor(readonly canvas: HTMLCanvasElement, many: boolean) {
     // Smooth edges cost four times the pixels; the dots of a large set hide them.
     this.renderer = new WebGLRenderer({ canvas, antialias: !many, alpha: true });
-    this.scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), this.light, this.rods);
+    this.scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), this.light, this.rods, this.lines);
   }
 
   dispose(): void {
@@ -160,6 +162,19 @@ export class ObjectScene {
     this.draw();
   }
 
+  // Thin lines: ways, edges of a box.
+  setLines(lines: Line[]): void {
+    for (const child of this.lines.children) (child as LineSegments).geometry.dispose();
+    this.lines.clear();
+    for (const { points, colour } of lines) {
+      if (!points.length) continue;
+      const geometry = new BufferGeometry();
+      geometry.setAttribute("position", new BufferAttribute(Float32Array.from(points), 3));
+      this.lines.add(new LineSegments(geometry, new LineBasicMaterial({ color: colourOf(colour) })));
+    }
+    this.draw();
+  }
+
   resize(width: number, height: number): void {
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio || 1));
     this.renderer.setSize(width, height, false);
@@ -193,6 +208,15 @@ export class ObjectScene {
   picture(): string {
     this.drawNow();
     return this.canvas.toDataURL();
+  }
+
+  // Onto another canvas, which keeps it: what WebGL has drawn is gone once the browser has shown it.
+  copyTo(other: HTMLCanvasElement): void {
+    if (!this.canvas.clientWidth) return;
+    this.resize(this.canvas.clientWidth, this.canvas.clientHeight);
+    this.drawNow();
+    Object.assign(other, { width: this.canvas.width, height: this.canvas.height });
+    other.getContext("2d")!.drawImage(this.canvas, 0, 0);
   }
 
   draw(): void {

@@ -44,6 +44,8 @@ export function IntervalPicture({ value }: { value: Value }) {
 
 export interface Column { title: string; number?: boolean }
 
+const shortRows = 12; // printed on one page
+
 interface TableProps {
   title: string; columns: (Column | string)[]; rows: ComponentChildren[][]; csv?: () => Row[]; tone?: (row: number) => string | undefined;
   caption?: ComponentChildren;
@@ -52,7 +54,7 @@ interface TableProps {
 export function Table({ title, columns, rows, csv, tone, caption }: TableProps) {
   const heads = columns.map((column) => (typeof column === "string" ? { title: column } : column));
   return (
-    <figure class="table">
+    <figure class={rows.length > shortRows ? "table" : "table short"}>
       {csv && <div class="plot-head"><div class="plot-title">{title}</div><Tools title={title} rows={csv} /></div>}
       <div class="scroll" tabIndex={0} role="region" aria-label={title}>
         <table>

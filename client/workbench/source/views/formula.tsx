@@ -1,11 +1,15 @@
 // An effect of one's own: a formula, the variables that it may use, and its errors where they are.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { type FormulaParameter, type FormulaWords, addFormula, formulaWords, namesIn, working } from "../data/live";
-import { touches } from "../state";
-import { typeset } from "../format";
+import { type FormulaParameter, type FormulaWords, formulaWords, namesIn } from "../data/formula";
+import { addFormula, working } from "../data/live";
+import { page, touches } from "../state";
+import { isPictures, typeset } from "../format";
 
-const adds: Record<string, string> = { travel_mm: "travel until contact (mm)", time_us: "contact time (\u00b5s)" };
-const fresh = (name: string): FormulaParameter => ({ name, value: "0", unit: "mm", min: "-1", max: "1" });
+// What it may add to, by what was measured.
+const ofTouches: Record<string, string> = { travel_mm: "travel until contact (mm)", time_us: "contact time (\u00b5s)" };
+const ofPhotographs: Record<string, string> = { grey: "grey level of a pixel (0 to 255)" };
+const unitOf: Record<string, string> = { travel_mm: "mm", time_us: "us", grey: "grey" };
+const fresh = (name: string, to: string): FormulaParameter => ({ name, value: "0", unit: unitOf[to], min: "-1", max: "1" });
 
 // "character 7: ..." of the parser, on the text that it is about.
 function Fault({ text, message, onShow }: { text: string; message: string; onShow(at: number): void }) {
@@ -23,7 +27,7 @@ export function Formula() {
   const [words, setWords] = useState<FormulaWords | null>(null);
   const [text, setText] = useState("");
   const [name, setName] = useState("");
-  const [to, setTo] = useState("travel_mm");
+  const [chosen, setTo] = useState("");
   const [parameters, setParameters] = useState<FormulaParameter[]>([]);
   const [fault, setFault] = useState("");
   const box = useRef<HTMLTextAreaElement>(null);
@@ -32,8 +36,12 @@ export function Formula() {
     if (!(event.currentTarget as HTMLDetailsElement).open || words) return;
     try { setWords(await formulaWords()); } catch (reason) { setFault((reason as Error).message); }
   };
-  const covariates = (touches.value?.columns ?? []).map((column) => column.name).filter((one) => one.startsWith("cov_"));
-  const known = new Set([...(words?.variables.map((one) => one.name) ?? []), ...(words?.pixel_variables.map((one) => one.name) ?? [])]);
+  const kinds = page.value?.report.data.map((data) => data.kind) ?? [];
+  const adds: Record<string, string> = { ...(kinds.length && kinds.every(isPictures) ? {} : ofTouches), ...(kinds.includes("PHOTOGRAPHS") ? ofPhotographs : {}) };
+  const to = chosen in adds ? chosen : Object.keys(adds)[0];
+  const offered: { name: string; unit: string; meaning: string }[] = (to === "grey" ? words?.pixel_variables : words?.variables) ?? [];
+  const covariates = to === "grey" ? [] : (touches.value?.columns ?? []).map((column) => column.name).filter((one) => one.startsWith("cov_"));
+  const known = new Set(offered.map((one) => one.name));
   useEffect(() => {
     const mine = ++asked.current; // of texts that were typed meanwhile the last counts
     if (!text.trim()) { setFault(""); setParameters([]); return; }
@@ -41,9 +49,9 @@ export function Formula() {
       if (mine !== asked.current) return;
       setFault("");
       const own = names.filter((one) => !known.has(one) && !one.startsWith("cov_"));
-      setParameters((before) => own.map((one) => before.find((other) => other.name === one) ?? fresh(one)));
+      setParameters((before) => own.map((one) => before.find((other) => other.name === one) ?? fresh(one, to)));
     }, (reason: Error) => { if (mine === asked.current) setFault(reason.message); });
-  }, [text, words]);
+  }, [text, words, to]);
   const insert = (word: string) => {
     const element = box.current!;
     element.setRangeText(word, element.selectionStart, element.selectionEnd, "end");
@@ -58,19 +66,20 @@ export function Formula() {
     if (wrong) return setFault(wrong);
     setText(""); setName(""); setParameters([]); setFault("");
   };
+  if (!to) return null; // boards have no effect of one's own
   return (
     <details class="formula" onToggle={(event) => void open(event)}>
       <summary>Add an effect of your own: a formula</summary>
       <form onSubmit={(event) => void add(event)}>
         <div class="row">
-          <label>Name <input value={name} required pattern="[A-Za-z][A-Za-z0-9_]*" title="Letters, digits and _, a letter first" placeholder="lead_screw" onInput={(event) => setName(event.currentTarget.value)} /></label>
+          <label>Name <input value={name} required pattern="[A-Za-z][A-Za-z0-9_]*" title="Letters, digits and _, a letter first" placeholder={to === "grey" ? "glare" : "lead_screw"} onInput={(event) => setName(event.currentTarget.value)} /></label>
           <label>It adds to the <select value={to} onChange={(event) => setTo(event.currentTarget.value)}>{Object.entries(adds).map(([key, title]) => <option value={key}>{title}</option>)}</select></label>
         </div>
-        <label>Formula <textarea ref={box} rows={2} value={text} required spellcheck={false} aria-invalid={!!fault} placeholder="k * sin(2*pi*travel_mm/lead)" onInput={(event) => setText(event.currentTarget.value)} /></label>
+        <label>Formula <textarea ref={box} rows={2} value={text} required spellcheck={false} aria-invalid={!!fault} placeholder={to === "grey" ? "k * radius^2" : "k * sin(2*pi*travel_mm/lead)"} onInput={(event) => setText(event.currentTarget.value)} /></label>
         {fault && <Fault text={text} message={fault} onShow={show} />}
         {words && (
           <div class="offered" role="group" aria-label="Variables">
-            {words.variables.map((one) => <button type="button" class="small" title={`${one.meaning}${one.unit ? ` (${one.unit})` : ""}`} onClick={() => insert(one.name)}>{one.name}</button>)}
+            {offered.map((one) => <button type="button" class="small" title={`${one.meaning}${one.unit ? ` (${one.unit})` : ""}`} onClick={() => insert(one.name)}>{one.name}</button>)}
             {covariates.map((one) => <button type="button" class="small" title="A column of the measurements" onClick={() => insert(one)}>{one}</button>)}
             <details><summary>Functions</summary>{[...words.functions.map((one) => ({ text: one.usage, meaning: one.meaning })), ...words.constants.map((one) => ({ text: one.name, meaning: one.meaning }))].map((one) => <div><code>{one.text}</code> <span class="soft">{one.meaning}</span></div>)}</details>
           </div>

@@ -4,7 +4,7 @@ import { Bar } from "../parts/parts";
 import { effectProbability, error, number, share, typeset, withError } from "../format";
 import { page } from "../state";
 import { Formula } from "./formula";
-import { type Lost, type ModelEffect, cancel, diagnose, diagnosis, failure, model, moved, openExample, origin, place, rungs, save, setValue, stale, take, undo, working } from "../data/live";
+import { type Lost, type ModelEffect, byHand, cancel, diagnose, diagnosis, failure, model, moved, openExample, origin, place, rungs, save, setValue, stale, take, undo, working } from "../data/live";
 
 const help: Record<NonNullable<Lost>, string> = {
   workbench: "If the program has ended, save the model first: this page cannot reach a new one. Then start touchstone workbench again, with --model and the saved file, and open the address that it prints.",
@@ -31,7 +31,7 @@ function Status() {
   if (!now) return <p class="live-status" role="status">{rungs.value.length ? "Up to date." : ""}</p>;
   return (
     <p class="live-status" role="status">
-      {typeset(now.what)}{now.stage && <> {"\u00b7"} {typeset(now.stage)}</>} <progress max={1} value={now.done || undefined} aria-label="Progress" />
+      {typeset(now.what)}{now.what !== byHand && <>{now.stage && <> {"\u00b7"} {typeset(now.stage)}</>} <progress max={1} value={now.done || undefined} aria-label="Progress" /></>}
       {now.cancellable && <button type="button" onClick={cancel}>Cancel</button>}
     </p>
   );
@@ -115,7 +115,8 @@ function Slider({ effect, parameter, entry }: { effect: ModelEffect; parameter: 
   const range = useRef<[number, number] | null>(null);
   if (!range.current || value < range.current[0] || value > range.current[1]) {
     const near = Math.max(4 * Math.abs(one.typical - one.neutral), 1.5 * Math.abs(value - one.neutral));
-    range.current = [Math.max(one.lower, one.neutral - near), Math.min(one.upper, one.neutral + near)];
+    // A formula's own parameter has no typical size: its bounds are what its author gave.
+    range.current = near > 0 ? [Math.max(one.lower, one.neutral - near), Math.min(one.upper, one.neutral + near)] : [one.lower, one.upper];
   }
   const [low, high] = range.current;
   return (

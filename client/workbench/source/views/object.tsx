@@ -5,7 +5,8 @@ import { tickText } from "../charts/scale";
 import { Tools } from "../parts/tools";
 import { count, error, isPictures, unitFor } from "../format";
 import { paint, refined, unpacked } from "../object/paint";
-import { movingPoints, ObjectScene, type Rod } from "../object/scene";
+import { movingPoints, type ObjectScene, type Rod } from "../object/scene";
+import { imageOf, overlayOf, Stage } from "../object/stage";
 import { entry, improved, limit as colourScale, object, page, selectTouch, shown, theme, touchIndex, touches, walk } from "../state";
 import type { Touches } from "../data/touches";
 import type { DataReport } from "../data/report";
@@ -65,39 +66,6 @@ function UncertaintyScale({ low, high, data }: { low: number; high: number; data
   );
 }
 
-// A length that is round and at most 110 px.
-function scaleBar(pixelsPerMm: number): { mm: number; px: number } {
-  const most = 110 / pixelsPerMm;
-  const power = 10 ** Math.floor(Math.log10(most));
-  const mm = ([5, 2, 1].find((round) => round * power <= most) ?? 1) * power;
-  return { mm, px: mm * pixelsPerMm };
-}
-
-function Overlay({ scene, labels }: { scene: ObjectScene; labels: { at: number[]; text: string }[] }) {
-  const [, redraw] = useState(0);
-  useEffect(() => { scene.onDraw = () => redraw((n) => n + 1); redraw(1); }, [scene]);
-  const { clientWidth: width, clientHeight: height } = scene.canvas;
-  const origin = scene.project(0, 0, 0);
-  const bar = scaleBar(scene.pixelsPerMm());
-  const axis = (k: number) => {
-    const tip = scene.project(k === 0 ? 1 : 0, k === 1 ? 1 : 0, k === 2 ? 1 : 0);
-    const factor = 30 / scene.pixelsPerMm();
-    return [(tip.x - origin.x) * factor, (tip.y - origin.y) * factor];
-  };
-  if (!Number.isFinite(bar.px) || !width) return null;
-  return (
-    <svg class="overlay" viewBox={`0 0 ${width} ${height}`} aria-hidden="true">
-      <g transform={`translate(44 ${height - 44})`}>
-        {["x", "y", "z"].map((name, k) => { const [x, y] = axis(k); return <><line x2={x} y2={y} stroke="var(--ink)" stroke-width="1.6" /><text x={x * 1.28} y={y * 1.28 + 4} text-anchor="middle" font-size="12" fill="var(--ink)">{name}</text></>; })}
-      </g>
-      <g transform={`translate(${width - 14} ${height - 16})`}>
-        <path d={`M${-bar.px} -5V0H0V-5`} fill="none" stroke="var(--ink)" stroke-width="1.6" /><text x={-bar.px / 2} y="-7" text-anchor="middle" font-size="12" fill="var(--ink)">{tickText(Number(bar.mm.toPrecision(3)))} mm</text>
-      </g>
-      {labels.map(({ at, text }) => { const p = scene.project(at[0], at[1], at[2]); return <text x={p.x} y={p.y} font-size="13" font-weight="700" text-anchor="middle" fill="var(--ink)" paint-order="stroke" stroke="var(--paper)" stroke-width="3">{text}</text>; })}
-    </svg>
-  );
-}
-
 const along = (from: number[], direction: number[], length: number) => from.map((x, k) => x + length * direction[k]);
 
 function touchRods(table: Touches, n: number, size: number, limit: number): Rod[] {
@@ -113,13 +81,9 @@ function touchRods(table: Touches, n: number, size: number, limit: number): Rod[
 export function ObjectView() {
   const table = touches.value;
   const data = entry.value?.data;
-  const canvas = useRef<HTMLCanvasElement>(null);
-  const svg = useRef<HTMLDivElement>(null);
   const [scene, setScene] = useState<ObjectScene | null>(null);
-  const [failed, setFailed] = useState("");
   const [painted, setPainted] = useState(true);
   const [unsure, setUnsure] = useState(false); // painted in the place of the residuals
-  const [hover, setHover] = useState("");
   const name = table && data ? objectToShow(table, data) : "";
   const limit = colourScale.value;
   const cells = useRef<{ of: string; table: Touches | null; list: number[] }>({ of: "", table: null, list: [] });
@@ -128,21 +92,6 @@ export function ObjectView() {
   const sureness = data && page.value!.words.of_data[page.value!.report.data.indexOf(data)]?.uncertainty?.[name];
   const uncertainty = unsure && sureness ? unpacked(sureness) : null;
   const mesh = useRef<ReturnType<typeof refined> | null>(null);
-
-  useEffect(() => {
-    if (!canvas.current) return;
-    let made: ObjectScene;
-    try {
-      made = new ObjectScene(canvas.current, list.length > movingPoints);
-    } catch {
-      setFailed("This browser has no WebGL, which the object needs; every other view works without it.");
-      return;
-    }
-    const observer = new ResizeObserver(() => made.resize(canvas.current!.clientWidth, canvas.current!.clientHeight));
-    observer.observe(canvas.current);
-    setScene(made);
-    return () => { observer.disconnect(); made.dispose(); };
-  }, [!table]);
 
   useEffect(() => {
     if (!scene || !table || !data) return;
@@ -191,57 +140,18 @@ export function ObjectView() {
   }, [scene, table, name, touchIndex.value, improved.value, theme.value, night]);
 
   if (!table || !data || isPictures(data.kind)) return null;
-  const place = (event: PointerEvent | MouseEvent): [number, number] => { const box = canvas.current!.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
-  const down = (event: PointerEvent) => { drag.current = { held: [event.clientX, event.clientY], moved: 0 }; canvas.current!.setPointerCapture(event.pointerId); scene?.hold(true); };
-  const move = (event: PointerEvent) => {
-    if (!scene) return;
-    const now = drag.current;
-    if (now.held) {
-      const [dx, dy] = [event.clientX - now.held[0], event.clientY - now.held[1]];
-      now.moved += Math.abs(dx) + Math.abs(dy);
-      now.held = [event.clientX, event.clientY];
-      scene.turn(dx * 0.009, dy * 0.009);
-    } else {
-      const at = scene.pick(...place(event));
-      setHover(at >= 0 ? describeCell(table, data.kind, list[at]) : "");
-    }
-  };
-  const up = (event: PointerEvent) => {
-    const moved = drag.current.moved;
-    drag.current = { held: null, moved: 0 };
-    scene?.hold(false);
-    if (moved > 4 || !scene) return;
-    const at = scene.pick(...place(event));
-    selectTouch(at >= 0 ? table.touchOf(list[at]) : null);
-  };
-  const keys: Record<string, () => void> = {
-    ArrowLeft: () => scene?.turn(0.12, 0), ArrowRight: () => scene?.turn(-0.12, 0), ArrowUp: () => scene?.turn(0, 0.12), ArrowDown: () => scene?.turn(0, -0.12),
-    "+": () => scene?.zoom(1.2), "=": () => scene?.zoom(1.2), "-": () => scene?.zoom(1 / 1.2), Enter: () => walk(1),
-  };
   return (
     <figure class="object-view">
       <div class="plot-head">
         <div class="plot-title"><b>{name}</b> <span class="soft">{count(list.length)} contacts</span></div>
         <label class="check"><input type="checkbox" checked={painted} onChange={(event) => setPainted(event.currentTarget.checked)} /> paint</label>
         {sureness && <label class="check"><input type="checkbox" checked={unsure} disabled={!painted} onChange={(event) => setUnsure(event.currentTarget.checked)} /> uncertainty</label>}
-        <Tools title={`Residuals on ${name}`} svg={() => svg.current?.querySelector("svg") ?? null} under={() => `<image width="${canvas.current!.clientWidth}" height="${canvas.current!.clientHeight}" href="${scene?.picture()}"/>`}
+        <Tools title={`Residuals on ${name}`} svg={() => overlayOf(scene)} under={() => imageOf(scene)}
           rows={() => [["touch", "finger", "x_mm", "y_mm", "z_mm", `residual_${data.unit}`, `after_${data.unit}`], ...list.filter((cell) => mask[cell]).map((cell) => [table.number[table.touchOf(cell)], table.names[table.fingerOf(cell)], table.contact[3 * cell], table.contact[3 * cell + 1], table.contact[3 * cell + 2], table.residual[cell], table.after[cell]])]} />
       </div>
-      <div class="stage" ref={svg}>
-        {failed ? <p class="empty">{failed}</p> : (
-          <canvas ref={canvas} tabIndex={0} role="application" aria-label={`Residuals on ${name}. Arrow keys turn it, plus and minus zoom, Enter goes to the next touch, the worst first.`}
-            onPointerDown={down} onPointerMove={move} onPointerUp={up} onPointerCancel={() => { drag.current = { held: null, moved: 0 }; scene?.hold(false); }} onPointerLeave={() => setHover("")}
-            onWheel={(event) => { if (event.ctrlKey) { event.preventDefault(); scene?.zoom(event.deltaY < 0 ? 1.1 : 1 / 1.1); } }}
-            onKeyDown={(event) => { const act = keys[event.key]; if (act && !event.ctrlKey) { event.preventDefault(); act(); } }} />
-        )}
-        {scene && <Overlay scene={scene} labels={arrows.map(({ label, text }) => ({ at: label, text }))} />}
-        <span class="zoom"><button type="button" aria-label="Nearer" onClick={() => scene?.zoom(1.25)}>+</button><button type="button" aria-label="Farther" onClick={() => scene?.zoom(1 / 1.25)}>−</button></span>
-        {hover && <div class="hover" role="status">{hover}</div>}
-      </div>
+      <Stage many={list.length > movingPoints} label={`Residuals on ${name}. Arrow keys turn it, plus and minus zoom, Enter goes to the next touch, the worst first.`} labels={arrows.map(({ label, text }) => ({ at: label, text }))} onScene={setScene}
+        describe={(dot) => describeCell(table, data.kind, list[dot])} onPick={(dot) => selectTouch(dot >= 0 ? table.touchOf(list[dot]) : null)} onEnter={() => walk(1)} />
       <figcaption><div><Scale limit={limit} data={data} />{painted && uncertainty && <UncertaintyScale low={uncertainty.low} high={uncertainty.high} data={data} />}</div><span>{painted && uncertainty && "Painted is how sure the improved model is of a contact time; where it is grey nothing was measured near. "}Each dot is one finger&rsquo;s contact, where the given model puts it{painted && uncertainty ? "." : "; between them their mean is painted."}{list.length > movingPoints && ` While it turns, an even sample of ${count(movingPoints)} is drawn.`}{next.length > 0 && " Numbered arrows: the next touches."}</span></figcaption>
     </figure>
   );
 }
-
-// Between two events of a pointer the view may be drawn anew.
-const drag: { current: { held: [number, number] | null; moved: number } } = { current: { held: null, moved: 0 } };

@@ -1,6 +1,6 @@
 // Always in sight where there is a rig: Stop, what the rig does, whose its lease is.
 import { useLayoutEffect, useRef } from "preact/hooks";
-import { controls, desk, pageName, press, silent, stop } from "../data/rig";
+import { controllerWent, controls, desk, otherPages, pageName, press, silent, stop } from "../data/rig";
 
 export const stateWords: Record<string, string> = {
   idle: "standing still", busy: "at work", draining: "the gateway is ending", stopped: "stopped", protective_stop: "protective stop", safeguard_stop: "safeguard stop",
@@ -43,8 +43,9 @@ export function RigBar() {
         <button type="button" class="stop" onClick={() => void stop()} title="Ends every motion now. A software stop, not safety-rated">Stop</button>
         <span class={`pill ${lost ? "wrong" : good.has(rig!.state!) ? "good" : "wrong"}`} role="status">{state}</span>
         {now && <span class="rig-who">
-          {controls.value ? "You control the rig." : now.controller ? `${pageName(now.controller)} controls the rig; you look on.` : now.rig.lease_holder ? `${now.rig.lease_holder} holds the lease.` : "Nobody controls the rig."}
+          {controls.value ? "You control the rig." : now.controller ? `${pageName(now.controller)} controls the rig${controllerWent.value ? ", but is gone" : ""}; you look on.` : now.rig.lease_holder ? `${now.rig.lease_holder} holds the lease.` : "Nobody controls the rig."}
         </span>}
+        {otherPages.value.length > 0 && <span class="soft rig-pages">Also here: {otherPages.value.map((page) => `page ${page.number}${page.hidden ? " (hidden)" : ""}`).join(", ")}.</span>}
         {now?.job && <span class="rig-job">{now.ask ? "waiting for a person" : now.job}{now.job_moves && total > 0 && now.job === "touching" && <> {"\u00b7"} {now.done} of {total} <progress max={total} value={now.done} aria-label="Touches made" /></>}</span>}
         {rig?.emulated && <span class="soft">emulated rig</span>}
       </div>

@@ -1,4 +1,5 @@
 // Several sessions of one rig: the error in each, which values changed, and a control chart of every value.
+import { useRef } from "preact/hooks";
 import { Key, Section, Table } from "../parts/parts";
 import { Tools } from "../parts/tools";
 import { count, error, number, probability, typeset, unitSymbol } from "../format";
@@ -33,6 +34,7 @@ const width = 360, height = 120, edge = 10;
 
 // A point a session with its standard error; the band is what the other sessions let expect.
 function ControlChart({ report, effect, value }: { report: Report; effect: ComparedEffect; value: ComparedValue }) {
+  const drawn = useRef<SVGSVGElement>(null);
   const limited = (one: SessionValue) => one.limit_upper > one.limit_lower;
   const low = Math.min(...value.sessions.map((one) => Math.min(one.value - 2 * one.std_error, limited(one) ? one.limit_lower : Infinity)));
   const high = Math.max(...value.sessions.map((one) => Math.max(one.value + 2 * one.std_error, limited(one) ? one.limit_upper : -Infinity)));
@@ -46,8 +48,8 @@ function ControlChart({ report, effect, value }: { report: Report; effect: Compa
   return (
     <figure class="chart control">
       <div class="plot-head"><div class="plot-title">{name}{value.unit && <span class="faint">, {unitSymbol(value.unit)}</span>}</div>
-        <Tools title={name} rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...value.sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]} /></div>
-      <svg viewBox={`0 0 ${width} ${height}`} role="img" aria-label={said}>
+        <Tools title={name} svg={() => drawn.current} rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...value.sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]} /></div>
+      <svg ref={drawn} viewBox={`0 0 ${width} ${height}`} role="img" aria-label={said}>
         {value.sessions.map((one, i) => limited(one) && <rect x={x(i) - step / 2} width={step} y={y(one.limit_upper)} height={Math.max(1, y(one.limit_lower) - y(one.limit_upper))} fill="var(--pale)" />)}
         <polyline points={value.sessions.map((one, i) => `${x(i)},${y(one.value)}`).join(" ")} fill="none" stroke="var(--axis)" />
         {value.sessions.map((one, i) => (

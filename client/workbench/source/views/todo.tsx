@@ -10,6 +10,7 @@ function Values({ values, title }: { values: Value[]; title: string }) {
   return (
     <Table title={title}
       columns={["Parameter", ...(changed ? [{ title: "in the model", number: true }] : []), { title: "value \u00b1 standard error", number: true }, { title: "95 % interval", number: true }, ""]}
+      csv={() => [["parameter", "finger", "object", "unit", "before", "value", "std_error", "lower", "upper"], ...values.map((value) => [value.name, value.finger, value.object, value.unit, value.before ?? "", value.value, value.std_error, value.lower, value.upper])]}
       rows={values.map((value) => [valueName(value), ...(changed ? [before(value)] : []), withError(value), interval(value), <IntervalPicture value={value} />])} />
   );
 }

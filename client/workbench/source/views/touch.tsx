@@ -6,8 +6,9 @@ import { Plot } from "../charts/plot";
 import { rangeOf } from "../charts/scale";
 import { download } from "../charts/export";
 import { Key, Section, Table } from "../parts/parts";
-import { type Checked, act, asksAlready, controls, desk, measuredCsv, pageName, press, refused, touched } from "../data/rig";
+import { type Checked, act, asksAlready, controllerWent, controls, desk, measuredCsv, pageName, press, refused, touched } from "../data/rig";
 import { openRigSet, working } from "../data/live";
+import { PlannedView } from "./planned";
 import { count } from "../format";
 
 const durationWords = (s: number) => (s < 90 ? `${Math.max(1, Math.round(s))} s` : s < 5400 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`);
@@ -49,7 +50,7 @@ function Control() {
   if (now.controller) {
     return (
       <div class="row">
-        <span>{pageName(now.controller)} controls the rig.</span>
+        <span>{pageName(now.controller)} controls the rig{controllerWent.value && `, but is gone: its lease is given back ${busy ? "once this has ended" : "now"}`}.</span>
         <button type="button" disabled={asksAlready.value} onClick={() => void act("request")}>{asksAlready.value ? "Asked for control" : "Ask for control"}</button>
         <button type="button" disabled={busy} title={busy ? "Not while the rig is at work" : "Agree with whoever sits there first"} onClick={() => void act("take")}>Take control</button>
       </div>
@@ -132,6 +133,7 @@ function DryRun({ checked }: { checked: Checked }) {
       <p>{checked.possible} of {touches(checked.touches)} possible, {durationWords(checked.duration_s)} of motion. Nothing was moved.</p>
       {checked.groups.length > 0 && <Table title="Setups" columns={["Object", "Face up", { title: "Touches", number: true }, { title: "Time", number: true }]}
         rows={checked.groups.map((group) => [group.object, group.up_face, count(group.touches), durationWords(group.duration_s)])} />}
+      <PlannedView />
       {impossible > 0 && <details><summary>{touches(impossible)} impossible here</summary><ul>{checked.impossible.map((one) => <li>Touch {one.touch} of {one.object}: {one.reason}</li>)}{impossible > checked.impossible.length && <li>and {impossible - checked.impossible.length} more</li>}</ul></details>}
       {checked.notes.length > 0 && <details><summary>Notes</summary><ul>{checked.notes.map((note) => <li>{note}</li>)}</ul></details>}
       {controls.value && checked.possible > 0 && <Agreed key={`start ${now.check}`} label={resumes ? "Start again \u2026" : "Start \u2026"} disabled={now.job !== "" || !!now.rig.stop_reason} what={what}

@@ -39,7 +39,7 @@ function Groups({ data, linked }: { data: DataReport; linked: boolean }) {
   const shown = [...kinds].filter(([, groups]) => groups.length > 1);
   if (!shown.length) return null;
   const name = (kind: string, group: Group) => {
-    if (!linked || (kind !== "OBJECT" && kind !== "FINGER")) return group.name;
+    if (!(linked ? kind === "OBJECT" || kind === "FINGER" : kind === "OBJECT" && data.photographs)) return group.name;
     const index = data.fingers.indexOf(group.name);
     const chosen = kind === "OBJECT" ? object.value === group.name : index >= 0 && finger.value === index;
     const act = () => {
