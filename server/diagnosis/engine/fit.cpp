@@ -62,8 +62,9 @@ class GaussNewton {
       : experiment_(experiment), model_(model), fit_(fit), members_(model.size() + 1) {
     std::iota(members_.begin(), members_.end(), 0);
     for (const FreeParameter& parameter : model_.parameters())
-      has_rough_derivatives_ |=
-          experiment_.observations->HasRoughDerivatives(*model_.base().effects[parameter.effect].effect);
+      rough_.push_back(
+          experiment_.observations->HasRoughDerivatives(*model_.base().effects[parameter.effect].effect));
+    has_rough_derivatives_ = std::find(rough_.begin(), rough_.end(), true) != rough_.end();
   }
 
   absl::Status Begin() {
@@ -72,13 +73,14 @@ class GaussNewton {
     return absl::OkStatus();
   }
 
-  absl::Status Linearise() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd derivatives,
-                                Derivatives(experiment_, model_, fit_->point, fit_->predicted, 0));
-    Eigen::MatrixXd values(experiment_.likelihood->rows(), model_.size() + 1);
-    values << experiment_.observations->Residual(fit_->predicted), derivatives;
-    fit_->columns = experiment_.likelihood->Prepare(values);
-    return absl::OkStatus();
+  absl::Status Linearise() { return LineariseFrom(0, Eigen::MatrixXd(experiment_.likelihood->rows(), 0)); }
+
+  // The derivatives of the first parameters are those of a fit of these alone, where it predicts the same.
+  absl::Status LineariseLike(const Fit& part) {
+    const int known = part.model.size();
+    const bool same = known <= model_.size() && part.columns.values.cols() == known + 1 &&
+                      part.point == fit_->point.head(known) && part.predicted == fit_->predicted;
+    return same ? LineariseFrom(known, part.columns.values.rightCols(known)) : Linearise();
   }
 
   LaplaceEvidence Evidence() const {
@@ -111,11 +113,15 @@ class GaussNewton {
         continue;
       }
       step.moved = true;
+      if (experiment_.update_derivatives) {
+        fit_->columns = experiment_.likelihood->Prepare(UpdatedColumns(point, predicted, r.values));
+      } else {
+        // The old derivatives are good enough if the simulator did what they predicted.
+        fit_->columns = Likelihood::Join(
+            r, Likelihood::Pick(fit_->columns, std::vector<int>(members_.begin() + 1, members_.end())));
+      }
       fit_->point = point;
       fit_->predicted = std::move(predicted);
-      // The old derivatives are good enough if the simulator did what they predicted.
-      fit_->columns = Likelihood::Join(
-          r, Likelihood::Pick(fit_->columns, std::vector<int>(members_.begin() + 1, members_.end())));
       return step;
     }
     return step;
@@ -132,6 +138,34 @@ class GaussNewton {
   }
 
  private:
+  // Simulates the derivatives from parameter `first` on.
+  absl::Status LineariseFrom(int first, const Eigen::MatrixXd& known) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd derivatives,
+                                Derivatives(experiment_, model_, fit_->point, fit_->predicted, first));
+    Eigen::MatrixXd values(experiment_.likelihood->rows(), model_.size() + 1);
+    values << experiment_.observations->Residual(fit_->predicted), known, derivatives;
+    fit_->columns = experiment_.likelihood->Prepare(values);
+    return absl::OkStatus();
+  }
+
+  // The residual at `point`, and derivatives that predict from there what the way to it has changed: Broyden's rank-one
+  // update, in units of the parameters' scales. Rough derivatives stay.
+  Eigen::MatrixXd UpdatedColumns(const Eigen::VectorXd& point, const std::vector<double>& predicted,
+                                 const Eigen::MatrixXd& residual) const {
+    Eigen::MatrixXd values = fit_->columns.values;
+    const Eigen::VectorXd step = point - fit_->point;
+    const Eigen::VectorXd missed =
+        experiment_.observations->Change(fit_->predicted, predicted) - values.rightCols(model_.size()) * step;
+    Eigen::VectorXd scaled = Eigen::VectorXd::Zero(model_.size());
+    for (int i = 0; i < model_.size(); ++i)
+      if (!rough_[i]) scaled[i] = step[i] / model_.parameters()[i].scale;
+    if (const double squares = scaled.squaredNorm(); squares > 0)
+      for (int i = 0; i < model_.size(); ++i)
+        values.col(1 + i) += missed * (scaled[i] / (squares * model_.parameters()[i].scale));
+    values.col(0) = residual;
+    return values;
+  }
+
   double LogPosterior(const Likelihood::Columns& residual, int s, const Eigen::VectorXd& point) const {
     const Likelihood& likelihood = *experiment_.likelihood;
     return likelihood.LogLikelihood(likelihood.Gram(residual, s)(0, 0), s) +
@@ -142,6 +176,7 @@ class GaussNewton {
   const Parameterization& model_;
   Fit* fit_;
   std::vector<int> members_;
+  std::vector<bool> rough_;  // by parameter: ObservationModel::HasRoughDerivatives
   bool has_rough_derivatives_ = false;
 };
 
@@ -171,27 +206,36 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
   return columns;
 }
 
-absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start, int max_iterations) {
+absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start, int max_iterations,
+                             const Fit* part) {
   Fit fit;
   GaussNewton search(experiment, start, &fit);
   TOUCHSTONE_RETURN_IF_ERROR(search.Begin());
   LaplaceEvidence evidence;
+  bool simulate = true;  // the derivatives, for the next step
   for (int iteration = 0;; ++iteration) {
-    TOUCHSTONE_RETURN_IF_ERROR(search.Linearise());
+    const bool like_part = iteration == 0 && part != nullptr && experiment.update_derivatives;
+    if (simulate) TOUCHSTONE_RETURN_IF_ERROR(like_part ? search.LineariseLike(*part) : search.Linearise());
+    const bool simulated = simulate;
     evidence = search.Evidence();
     if (start.size() == 0 || iteration == max_iterations ||
         search.DistanceLeft(evidence) < experiment.near_enough)
       break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const GaussNewton::Step step, search.MoveAlong(evidence));
-    if (!step.moved) break;
+    // Derivatives that were updated may lead nowhere, or end a fit too early: simulated ones have the last word.
+    if (!step.moved && simulated) break;
+    simulate = !experiment.update_derivatives || !step.moved;
+    if (!step.moved) continue;
     const LaplaceEvidence after = search.Evidence();
     // A full step that ended where the linearised prediction said needs no further derivatives.
     const bool as_predicted = step.fraction == 1 && search.DistanceLeft(after) < kSmallStep &&
                               std::abs(after.log_evidence - evidence.log_evidence) < kConverged;
-    if (step.gain < kConverged || as_predicted) {
+    if (step.gain >= kConverged && !as_predicted) continue;
+    if (simulated) {
       evidence = after;
       break;
     }
+    simulate = true;
   }
   start.MoveTo(fit.point);
   fit.model = std::move(start);

@@ -26,6 +26,10 @@ struct Experiment {
   std::vector<std::string> settled;
   // Standard errors: a fit ends where no value has farther to go; 0: by its likelihood alone.
   double near_enough = 0;
+  // Derivatives are updated by what the last step really changed (Broyden, A class of methods for solving nonlinear
+  // simultaneous equations, 1965), and simulated again only where that leads no further: for searches whose rows take long
+  // to simulate.
+  bool update_derivatives = false;
 };
 
 struct Fit {
@@ -46,9 +50,10 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
                                             const Eigen::VectorXd& point,
                                             const std::vector<double>& predicted, int first);
 
-// `max_iterations` 0 only evaluates the start.
+// `max_iterations` 0 only evaluates the start. `part`: a fit of the first parameters of `start`, if any is known; where
+// derivatives are updated and the others change nothing at the start, its derivatives are taken over.
 inline constexpr int kMaxIterations = 10;
 absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start,
-                             int max_iterations = kMaxIterations);
+                             int max_iterations = kMaxIterations, const Fit* part = nullptr);
 
 }  // namespace touchstone::diagnosis::engine

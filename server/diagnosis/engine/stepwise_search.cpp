@@ -66,7 +66,7 @@ absl::StatusOr<bool> StepwiseSearch::FallsHeldOut(const Fit& before, const Fit& 
   return had * had - has * has > (1 - kept * kept) * before.sigma * before.sigma;
 }
 
-absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) const {
+absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, const Fit* from) const {
   std::vector<Parameterization> starts = {extension.start};
   const model::Effect* effect =
       extension.candidate >= 0 ? candidates_[extension.candidate].effect.get() : nullptr;
@@ -94,7 +94,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension) con
   }
   absl::StatusOr<Fit> best = absl::InternalError("no fit");
   for (Parameterization& start : starts) {
-    absl::StatusOr<Fit> fit = FitModel(experiment_, std::move(start));
+    absl::StatusOr<Fit> fit = FitModel(experiment_, std::move(start), kMaxIterations, from);
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit;
     if (fit.ok() && (!best.ok() || fit->log_evidence > best->log_evidence)) best = std::move(fit);
     if (!best.ok() && !fit.ok()) best = fit.status();
@@ -121,7 +121,7 @@ absl::StatusOr<std::optional<StepwiseSearch::Tried>> StepwiseSearch::BestExtensi
     if (!near && (extension.rare || (!unreached && !user))) continue;
     progress_(absl::StrCat("fitting ", InWords(extension)));
     (extension.rare ? fitted_rare : fitted) += near;
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension, &from));
     if (best && fit.log_evidence <= best->fit.log_evidence) continue;
     best = {std::move(fit), extension.rare ? rare : extensions.size() - rare, extension.rare};
   }
@@ -204,7 +204,7 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
     if (!likely && !declared) continue;
     progress_(absl::StrCat("trying ", InWords(extension), " instead of ", NameOf(own)));
     (extension.rare ? fitted_rare : fitted) += likely;
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension, &without));
     competing.push_back({given ? absl::StrCat(kGivenPrefix, extension.name) : extension.name, per_object,
                          extension.object, extension.nameless, std::move(fit)});
   }

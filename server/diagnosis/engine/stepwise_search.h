@@ -99,8 +99,9 @@ class StepwiseSearch {
   // The fit with the effect taken out (one of the initial model: held at its values there).
   absl::StatusOr<Fit> WithoutEffect(const Explanation& explanation, int index) const;
 
-  // An extension fitted in full, from several starts where the response is not linear.
-  absl::StatusOr<Fit> FitExtension(const Extension& extension) const;
+  // An extension fitted in full, from several starts where the response is not linear. `from`: the fit that it extends, if
+  // that is at hand (FitModel's `part`).
+  absl::StatusOr<Fit> FitExtension(const Extension& extension, const Fit* from = nullptr) const;
 
   const Experiment& experiment() const { return experiment_; }
   const SearchRules& rules() const { return rules_; }

@@ -146,7 +146,9 @@ absl::StatusOr<engine::Explanation> ExplainCoarsely(const DiagnosisInput& input,
   const auto search = [&](const PhotoRowsOptions& options,
                           const std::vector<engine::Candidate>& of) -> absl::StatusOr<PhotoSearch> {
     absl::StatusOr<PhotoSearch> made = MakePhotoSearch(photographs, anchor, of, options, context);
-    if (made.ok()) made->experiment->settled = input.settled;
+    if (!made.ok()) return made;
+    made->experiment->settled = input.settled;
+    made->experiment->update_derivatives = true;
     return made;
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(PhotoSearch coarse, search(kCoarse, candidates));
