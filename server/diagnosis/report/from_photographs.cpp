@@ -79,6 +79,7 @@ DataReport DataOf(const images::PhotographDiagnosis& found, const session::Image
   data.kind = DataKind::kPhotographs;
   data.session = set.origin;
   data.emulated = session::CountEmulated(set);
+  data.content_sha256 = set.sha256;
   data.count = found.images;
   if (found.verdict == engine::Verdict::kTooLittleData) data.needed = found.images_needed;
   std::set<std::vector<double>> poses;
