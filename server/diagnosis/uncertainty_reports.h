@@ -10,7 +10,9 @@
 namespace touchstone::diagnosis {
 
 // Budgets, and the uncertainty at each of data[0]'s points on the surfaces. `prediction`: of the posterior's
-// model, with details.
+// model, with details. Where data[0] has the errors of that model, what it leaves of them beyond noise and surfaces is the
+// contribution "misfit", the same for every object and in no point's uncertainty. Values at a bound of their range, which no
+// contribution has, are warnings.
 absl::Status AddUncertainty(const touches::Predictor& predictor, const touches::Prediction& prediction,
                             const uncertainty::Posterior& posterior, report::Diagnosis* diagnosis);
 
