@@ -40,31 +40,6 @@ void PaintPoints(const touches::Observations& o, const touches::Prediction& pred
   }
 }
 
-// Of a finger less the mean over its touch.
-void AddMisfitOfTouches(const report::DataReport& data, std::vector<Budget>* budgets) {
-  if (!data.final || !data.noise_floor || data.fingers.size() < 2) return;
-  uncertainty::AddMisfit({data.final->rmse, data.noise_floor->sigma, data.final->lack_of_fit_p},
-                         1 - 1 / static_cast<double>(data.fingers.size()), budgets);
-}
-
-// Values of which the data say no more than that they lie at a bound: no standard error is theirs.
-void WarnOfBounds(const uncertainty::Posterior& posterior, std::vector<std::string>* warnings) {
-  for (size_t i = 0; i < posterior.values.size(); ++i) {
-    const double value = posterior.ValueOf(posterior.model, i);
-    const double lower = posterior.Lower(i), upper = posterior.Upper(i);
-    const double near = kAtBound * (upper - lower);
-    if (posterior.StdError(i) > near || (value - lower > near && upper - value > near)) continue;
-    const model::ParameterInfo& parameter = posterior.ParameterOf(i);
-    const uncertainty::OpenValue& open = posterior.values[i];
-    const std::string entry = model::EntryName(parameter, open.entry, posterior.model.fingers);
-    warnings->push_back(absl::StrCat(
-        model::NameOf(posterior.EffectOf(i)), ".", parameter.name, entry.empty() ? "" : " of ", entry,
-        open.object.empty() ? "" : " on ", open.object, " = ", FileNumber(parameter.unit, value),
-        " is at a bound of its range, where it has no standard error: what it leaves open is not in the "
-        "uncertainty budget."));
-  }
-}
-
 std::string PercentOf(double share) {
   return absl::StrFormat("%.0f %%", 100 * share);
 }
@@ -98,6 +73,29 @@ std::string Summary(const Budget& all) {
 }
 
 }  // namespace
+
+void AddMisfitOfTouches(const report::DataReport& data, std::vector<Budget>* budgets) {
+  if (!data.final || !data.noise_floor || data.fingers.size() < 2) return;
+  uncertainty::AddMisfit({data.final->rmse, data.noise_floor->sigma, data.final->lack_of_fit_p},
+                         1 - 1 / static_cast<double>(data.fingers.size()), budgets);
+}
+
+void WarnOfBounds(const uncertainty::Posterior& posterior, std::vector<std::string>* warnings) {
+  for (size_t i = 0; i < posterior.values.size(); ++i) {
+    const double value = posterior.ValueOf(posterior.model, i);
+    const double lower = posterior.Lower(i), upper = posterior.Upper(i);
+    const double near = kAtBound * (upper - lower);
+    if (posterior.StdError(i) > near || (value - lower > near && upper - value > near)) continue;
+    const model::ParameterInfo& parameter = posterior.ParameterOf(i);
+    const uncertainty::OpenValue& open = posterior.values[i];
+    const std::string entry = model::EntryName(parameter, open.entry, posterior.model.fingers);
+    warnings->push_back(absl::StrCat(
+        model::NameOf(posterior.EffectOf(i)), ".", parameter.name, entry.empty() ? "" : " of ", entry,
+        open.object.empty() ? "" : " on ", open.object, " = ", FileNumber(parameter.unit, value),
+        " is at a bound of its range, where it has no standard error: what it leaves open is not in the "
+        "uncertainty budget."));
+  }
+}
 
 absl::Status AddUncertainty(const touches::Predictor& predictor, const touches::Prediction& prediction,
                             const uncertainty::Posterior& posterior, report::Diagnosis* diagnosis) {
