@@ -13,6 +13,7 @@
 #include "server/base/out_of_memory.h"
 #include "server/base/text.h"
 #include "server/service/channel/channel.h"
+#include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"
 
 namespace {
@@ -80,6 +81,7 @@ int main(int argc, char** argv) {
   app.add_option("--timeout-s", options.timeout_s, "Seconds to wait. Default: 3")
       ->check(CLI::Range(0.1, 60.0));
   if (touchstone::service::PrintedManPage(app, argc, argv)) return 0;
+  app.formatter(std::make_shared<touchstone::service::HelpLayout>());
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

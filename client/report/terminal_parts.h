@@ -11,6 +11,8 @@ void AddDataProblems(const v1::Report& report, TextLayout* out);   // mistakes o
 void AddWhy(const v1::Report& report, TextLayout* out);
 void AddUnexplained(const v1::Report& report, TextLayout* out);
 void AddWhatToDo(const v1::Report& report, TextLayout* out);
+// What the predictions of the model that the report ends with are unsure by, a line per contribution, largest first.
+void AddBudget(const v1::Report& report, TextLayout* out);
 void AddNext(const v1::Report& report, TextLayout* out);        // touches to make, pictures to take
 void AddBlindSpots(const v1::Report& report, TextLayout* out);  // effects that the set could not have shown
 void AddVersus(const v1::Report& report, TextLayout* out);      // a comparison with a second model

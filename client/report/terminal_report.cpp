@@ -175,6 +175,7 @@ std::string TerminalReport(const v1::Report& report, int width, bool colour) {
   AddWhy(report, &out);
   AddUnexplained(report, &out);
   AddLadder(report, &out);
+  AddBudget(report, &out);
   AddBlindSpots(report, &out);
   AddWhatToDo(report, &out);
   AddNext(report, &out);

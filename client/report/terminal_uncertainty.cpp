@@ -3,6 +3,7 @@
 
 #include "client/report/error_scale.h"
 #include "client/report/report.h"
+#include "client/report/terminal_parts.h"
 #include "client/report/text_layout.h"
 #include "client/report/words.h"
 
@@ -29,7 +30,38 @@ std::vector<BudgetCell> BudgetRow(const v1::UncertaintyBudget& budget, bool repr
   return row;
 }
 
+constexpr int kBudgetBar = 20;
+
 }  // namespace
+
+void AddBudget(const v1::Report& report, TextLayout* out) {
+  if (report.data_size() == 2 && report.data(0).kind() != report.data(1).kind() &&
+      !report.improved_model_hash().empty()) {
+    out->Label("Budget");
+    out->Paragraph(
+        "None: values that touches and photographs share have no joint uncertainty yet. Diagnose each by "
+        "itself: touches.csv, and the folder without it.");
+  }
+  if (report.data().empty() || report.uncertainty().empty()) return;
+  const v1::UncertaintyBudget& all = report.uncertainty(report.uncertainty_size() - 1);
+  if (all.contributions().empty()) return;
+  const ErrorScale scale(report.data(0));
+  out->Label("Budget");
+  const char* const reading = scale.kind() == v1::DataReport::PHOTOGRAPHS ? "A pixel of a new photograph"
+                              : scale.kind() == v1::DataReport::BOARDS
+                                  ? "A corner in a new picture of the board"
+                                  : "A new reading of a finger, less the mean over its touch,";
+  out->Paragraph(absl::StrCat(reading, " is predicted with a standard uncertainty of ",
+                              scale.Text(all.combined()), ". Of that:"));
+  std::vector<std::vector<BudgetCell>> rows;
+  for (const v1::UncertaintyBudget::Contribution& contribution : all.contributions())
+    rows.push_back(
+        {{contribution.name()},
+         {scale.Text(contribution.std_uncertainty()), true},
+         {Share(contribution.share()), true},
+         {std::string(BarLength(contribution.share(), 1, kBudgetBar), '#'), false, TextLayout::kBar}});
+  out->Rows(rows);
+}
 
 std::string TerminalUncertainty(const v1::Report& report, int width, bool colour) {
   TextLayout out(width, colour);
@@ -54,6 +86,8 @@ std::string TerminalUncertainty(const v1::Report& report, int width, bool colour
   const int count = report.uncertainty_size() == 2 ? 1 : report.uncertainty_size();
   for (int i = 0; i < count; ++i) rows.push_back(BudgetRow(report.uncertainty(i), estimated, scale));
   out.Rows(rows);
+  out.Blank();
+  AddBudget(report, &out);
   out.Blank();
   out.Lead(
       absl::StrCat("Standard uncertainties of a finger's next reading, less the mean over its touch, root "

@@ -13,6 +13,7 @@
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 #include "server/model/own_name.h"
+#include "server/model/provenance.h"
 
 namespace touchstone::workbench {
 namespace {
@@ -56,6 +57,16 @@ absl::Status SetFormula(const std::vector<std::string>& assignments, model::Effe
     formula->values[found - parameters.begin()] = ToSi(found->unit, value);
   }
   return absl::OkStatus();
+}
+
+// What was taken from a model was fitted to what that was; errors are those of the whole.
+absl::StatusOr<std::string> TextOfTaken(const model::Model& model, const std::string& from) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model whole, Parse(from, "the improved model"));
+  if (model.Hash() == whole.Hash()) return from;
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Provenance provenance,
+                              model::ReadProvenance(from, "the improved model"));
+  for (model::UsedSet& set : provenance.fitted_to) set.unit.clear();
+  return model::FormatModel(model) + model::FormatProvenance(provenance);
 }
 
 absl::StatusOr<model::Model> Changed(const json& request) {
@@ -122,9 +133,12 @@ absl::StatusOr<std::string> ChangeModel(const std::string& request) {
   const json parsed = json::parse(request, nullptr, /*allow_exceptions=*/false);
   if (!parsed.is_object()) return absl::InvalidArgumentError("a change of a model is a JSON object");
   try {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model, Changed(parsed));
-    const std::string yaml = model::FormatModel(model);
-    TOUCHSTONE_RETURN_IF_ERROR(Parse(yaml, "the changed model").status());
+    TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model, Changed(parsed));
+    std::string yaml = model::FormatModel(model);
+    if (parsed.at("change") == "take") {
+      TOUCHSTONE_ASSIGN_OR_RETURN(yaml, TextOfTaken(model, parsed.at("from")));
+    }
+    TOUCHSTONE_ASSIGN_OR_RETURN(model, Parse(yaml, "the changed model"));
     return json{{"yaml", yaml}, {"hash", model.Hash()}, {"name", model.name}, {"effects", EffectsJson(model)}}
         .dump(-1, ' ', false, json::error_handler_t::replace);
   } catch (const json::exception& error) {

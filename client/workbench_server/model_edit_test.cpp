@@ -1,5 +1,6 @@
 #include "client/workbench_server/model_edit.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -35,6 +36,30 @@ TEST(ChangeModel, TakesAnEffectOfAnotherModelOnce) {
   const json replaced = Changed(request);
   ASSERT_EQ(replaced["effects"].size(), 1u);
   EXPECT_EQ(replaced["effects"][0]["parameters"][0]["values"][0], 3.0);
+}
+
+TEST(ChangeModel, SaysWhatATakenEffectWasFittedTo) {
+  const std::string from =
+      With({"radius_mm=2"}) +
+      "provenance:\n  over: {name: nominal, hash: 8e3c}\n  fitted_to:\n"
+      "    - {set: set.csv, sha256: 0f3a, unit: us, rmse_before: 9000, rmse_after: 5000}\n";
+  json request = {{"yaml", model::FormatModel(model::NominalModel())},
+                  {"change", "take"},
+                  {"effect", "tip_radius"},
+                  {"from", from}};
+  const json whole = Changed(request);
+  EXPECT_EQ(whole["yaml"], from);
+  // With a change of the user's own beside it the errors are no longer those.
+  request["yaml"] = model::FormatModel(
+      *model::AddEffect(model::NominalModel(), "object_push", {"shift_mm=1"}, effects::Catalogue()));
+  const std::string part = Changed(request)["yaml"];
+  EXPECT_THAT(part, testing::HasSubstr("- {set: set.csv, sha256: \"0f3a\"}"));
+  // A value of another origin says nothing.
+  EXPECT_THAT(std::string(Changed({{"yaml", whole["yaml"]},
+                                   {"change", "set"},
+                                   {"effect", "tip_radius"},
+                                   {"assignments", {"radius_mm=1.5"}}})["yaml"]),
+              testing::Not(testing::HasSubstr("provenance")));
 }
 
 TEST(ChangeModel, SetsAndRemovesAnEffect) {

@@ -18,7 +18,7 @@ enum class RandomDomain : uint64_t {
   kSurfaceField = 6,  // the smooth error of an object's surface
   kImage = 7,
   kDiagnosis = 8,
-  kNoiseMemory = 9,  // the wander of a finger in session time
+  kNoiseMemory = 9,  // correlated noise of a finger in session time
   kModelDraw = 10,   // the model of sample `index`, where a posterior has many
   kTest = 1000,
 };

@@ -4,12 +4,14 @@
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
 #include "server/session/emulated.h"
+#include "server/session/touch_content.h"
 
 namespace touchstone::diagnosis {
 
 report::DataReport DataOf(const touches::Observations& observations, const DiagnosisInput& input) {
   report::DataReport data = report::DataOfTouches(touches::SummarizeData(observations));
   data.emulated = session::CountEmulated(*input.set);
+  data.content_sha256 = session::TouchContentSha256(*input.set);
   return data;
 }
 

@@ -353,6 +353,8 @@ class SessionsReporter {
     TOUCHSTONE_ASSIGN_OR_RETURN(const report::Diagnosis budgets,
                                 UncertaintyOfPlan(sessions_[last_session_], posterior, Stretch(1, 1)));
     diagnosis_.uncertainty = budgets.uncertainty;
+    AddMisfitOfTouches(diagnosis_.data[last_session_], &diagnosis_.uncertainty);
+    WarnOfBounds(posterior, &diagnosis_.warnings);
     return absl::OkStatus();
   }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <map>
 
+#include "server/base/file_number.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/design/plan_check.h"
@@ -13,11 +14,14 @@
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/selection/workspace.h"
 #include "server/diagnosis/touches/time_uncertainties.h"
+#include "server/model/value_names.h"
 
 namespace touchstone::diagnosis {
 namespace {
 
 using uncertainty::Budget;
+
+constexpr double kAtBound = 1e-6;  // of the range
 
 void PaintPoints(const touches::Observations& o, const touches::Prediction& prediction,
                  const touches::SetUncertainty& found, std::vector<residuals::SurfaceResidual>* points) {
@@ -65,17 +69,43 @@ std::string Summary(const Budget& all) {
   return absl::StrFormat(
       "A contact time of these %d touches, less the mean over its touch, is predicted with a standard "
       "uncertainty of %.3g ms; %s of its square is %s.",
-      all.touches, all.combined_s * 1e3, PercentOf(first.share), first.name);
+      all.touches, all.combined / 1000, PercentOf(first.share), first.name);
 }
 
 }  // namespace
+
+void AddMisfitOfTouches(const report::DataReport& data, std::vector<Budget>* budgets) {
+  if (!data.final || !data.noise_floor || data.fingers.size() < 2) return;
+  uncertainty::AddMisfit({data.final->rmse, data.noise_floor->sigma, data.final->lack_of_fit_p},
+                         1 - 1 / static_cast<double>(data.fingers.size()), budgets);
+}
+
+void WarnOfBounds(const uncertainty::Posterior& posterior, std::vector<std::string>* warnings) {
+  for (size_t i = 0; i < posterior.values.size(); ++i) {
+    const double value = posterior.ValueOf(posterior.model, i);
+    const double lower = posterior.Lower(i), upper = posterior.Upper(i);
+    const double near = kAtBound * (upper - lower);
+    if (posterior.StdError(i) > near || (value - lower > near && upper - value > near)) continue;
+    const model::ParameterInfo& parameter = posterior.ParameterOf(i);
+    const uncertainty::OpenValue& open = posterior.values[i];
+    const std::string entry = model::EntryName(parameter, open.entry, posterior.model.fingers);
+    warnings->push_back(absl::StrCat(
+        model::NameOf(posterior.EffectOf(i)), ".", parameter.name, entry.empty() ? "" : " of ", entry,
+        open.object.empty() ? "" : " on ", open.object, " = ", FileNumber(parameter.unit, value),
+        " is at a bound of its range, where it has no standard error: what it leaves open is not in the "
+        "uncertainty budget."));
+  }
+}
 
 absl::Status AddUncertainty(const touches::Predictor& predictor, const touches::Prediction& prediction,
                             const uncertainty::Posterior& posterior, report::Diagnosis* diagnosis) {
   const uncertainty::PredictedTimes times(std::make_shared<const uncertainty::Posterior>(posterior));
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::SetUncertainty found,
                               touches::UncertaintyOf(predictor, prediction, times));
-  diagnosis->uncertainty = found.budgets;
+  for (const Budget& budget : found.budgets)
+    diagnosis->uncertainty.push_back(uncertainty::Scaled(budget, 1 / SiFactor(Unit::kMicrosecond)));
+  AddMisfitOfTouches(diagnosis->data[0], &diagnosis->uncertainty);
+  WarnOfBounds(posterior, &diagnosis->warnings);
   PaintPoints(predictor.observations(), prediction, found, &diagnosis->data[0].surface_points);
   return absl::OkStatus();
 }

@@ -5,7 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 #include "server/base/normal.h"
 #include "server/base/test_tier.h"
@@ -18,7 +21,9 @@
 namespace touchstone::diagnosis {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 touches::HiddenRig RigWithTips(uint64_t seed = 1) {
   touches::HiddenRig rig;
@@ -82,6 +87,52 @@ TEST(Posterior, IsOfTheModelThatIsSaved) {
   EXPECT_TRUE(uncertainty::FromMessage(message).ok());
 }
 
+TEST(Posterior, AValueAtItsBoundIsSaid) {
+  const DiagnosisInput input = touches::MakeTestInput(RigWithTips());
+  uncertainty::Posterior posterior = *Diagnosed(input).posterior;
+  EXPECT_THAT(Uncertainty(input, posterior, {})->warnings, testing::Each(Not(HasSubstr("bound"))));
+  posterior.SetValue(0, posterior.Upper(0), &posterior.model);
+  posterior.covariance.setZero();
+  EXPECT_THAT(
+      Uncertainty(input, posterior, {})->warnings,
+      testing::Contains(AllOf(HasSubstr("tip_radius.radius_mm = "), HasSubstr("at a bound of its range"))));
+}
+
+// A finger that stands elsewhere on some touches is no effect of the catalogue.
+TEST(Posterior, AMisfitThatTheModelLeavesIsInTheBudget) {
+  DiagnosisInput input = touches::MakeTestInput(RigWithTips());
+  const report::Diagnosis fits = Diagnosed(input);
+  const auto misfit = [](const report::Diagnosis& report) -> const uncertainty::Contribution* {
+    const auto& all = report.uncertainty.back().contributions;
+    const auto found =
+        std::find_if(all.begin(), all.end(), [](const auto& one) { return one.name == "misfit"; });
+    return found == all.end() ? nullptr : &*found;
+  };
+  EXPECT_EQ(misfit(fits), nullptr);
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  std::map<std::array<double, 3>, double> jump_s;  // the same for the repeats of a pose
+  for (int row = 0; row < set->size(); ++row) {
+    const Eigen::Vector3d& at = set->target_m[row];
+    const auto [jump, is_new] = jump_s.try_emplace({at.x(), at.y(), at.z()}, 0);
+    if (is_new) jump->second = jump_s.size() % 2 == 0 ? 0.02 : -0.02;
+    set->time_s[static_cast<size_t>(row) * set->fingers + 1] += jump->second;
+  }
+  input.set = set;
+  const report::Diagnosis left = Diagnosed(input);
+  const uncertainty::Budget& all = left.uncertainty.back();
+  ASSERT_NE(misfit(left), nullptr) << left.summary;
+  double shares = 0, squares = 0;
+  for (const uncertainty::Contribution& one : all.contributions) {
+    EXPECT_LE(one.share, all.contributions[0].share);
+    shares += one.share, squares += one.std_uncertainty * one.std_uncertainty;
+  }
+  EXPECT_NEAR(shares, 1, 0.02);
+  EXPECT_NEAR(std::sqrt(squares) / all.combined, 1, 0.01);
+  // Of a finger less the mean over three.
+  const double error = left.data[0].final->rmse;
+  EXPECT_NEAR(all.combined, error * std::sqrt(2.0 / 3), 0.01 * error);
+}
+
 TEST(Posterior, OpensValuesThatTheSearchHasLeftAlone) {
   touches::HiddenRig rig = RigWithTips();
   rig.known = rig.hidden;
@@ -138,8 +189,8 @@ TEST(UncertaintyOfPlan, IsThatOfTheReportOnItsOwnTouches) {
   // Touches at an edge are left out of both, those that the report set aside of it alone.
   EXPECT_GE(plan->uncertainty.back().touches, report.uncertainty.back().touches);
   EXPECT_LE(plan->uncertainty.back().touches, report.uncertainty.back().touches + 3);
-  EXPECT_NEAR(plan->uncertainty.back().combined_s, report.uncertainty.back().combined_s,
-              0.05 * report.uncertainty.back().combined_s);
+  EXPECT_NEAR(plan->uncertainty.back().combined, report.uncertainty.back().combined,
+              0.05 * report.uncertainty.back().combined);
   EXPECT_THAT(plan->warnings.back(), HasSubstr("an edge"));
   EXPECT_EQ(plan->verdict, engine::Verdict::kNone);
   EXPECT_GT(plan->data[0].surface_points.size(), 0u);
@@ -175,8 +226,8 @@ TEST(Posterior, OfSeveralSessionsKnowsWhatDiffersBetweenThem) {
   EXPECT_EQ(report->posterior->model.Hash(), report->improved_model->Hash());
   ASSERT_TRUE(report->posterior->values[0].between_sessions);
   EXPECT_NEAR(*report->posterior->values[0].between_sessions, 3e-4, 1e-4);
-  ASSERT_TRUE(report->uncertainty.back().reproducibility_s);
-  EXPECT_GT(*report->uncertainty.back().reproducibility_s, report->uncertainty.back().parameters_s);
+  ASSERT_TRUE(report->uncertainty.back().reproducibility);
+  EXPECT_GT(*report->uncertainty.back().reproducibility, report->uncertainty.back().parameters);
 }
 
 TEST(Posterior, OfPhotographsOrMistakenSetsIsNone) {

@@ -14,7 +14,7 @@ struct Parameters {
 
 constexpr ParameterRow<Parameters> kRows[] = {
     {&Parameters::sigma_s, "sigma_us", Unit::kMicrosecond, 0, 1e6, 0, 5000,
-     "Standard deviation of one finger's wander about its mean."},
+     "Standard deviation of one finger's correlated noise."},
     {&Parameters::time_s, "time_s", Unit::kSecond, 1e-3, 1e6, 300, 300,
      "How long it remembers: touches this far apart share 37 % of their error. Changes nothing at sigma_us "
      "0."},
@@ -33,19 +33,18 @@ model::Effect CorrelatedNoise() {
       .name = "correlated_noise",
       .stage = model::Stage::kSensor,
       .role = model::EffectRole::kNoiseMemory,
-      .meaning =
-          "Each finger's time wanders: noise that remembers, so touches made one after the other err alike.",
+      .meaning = "Correlated noise (AR(1)) of each finger: touches made one after the other err alike.",
       .signature = "Repeats of a touch differ more the longer the pause between them; neighbours in time "
                    "agree. Unlike "
                    "thermal_drift the course has no direction and another session shows another one.",
       .check_on_rig =
-          "Repeat one touch every ten seconds for an hour: the times wander instead of scattering.",
-      .remedy = "Look for what wanders (temperature, supply, a loose part), or touch a reference plate now "
+          "Repeat one touch every ten seconds for an hour: the times drift instead of scattering.",
+      .remedy = "Look for what drifts (temperature, supply, a loose part), or touch a reference plate now "
                 "and then.",
       .confounded_with =
           {
               {"thermal_drift",
-               "Repeat the session: a drift takes the same course again, a wander another one."},
+               "Repeat the session: a drift takes the same course again, correlated noise another one."},
           },
       .rows = kRows,
       .apply = Apply,

@@ -36,7 +36,7 @@ model::Effect Specular() {
       .meaning = "The surface is glossy: it mirrors the key light.",
       .signature =
           "Bright spots on curved places where the surface looks halfway between the light and the eye; "
-          "they wander over the object as the camera moves.",
+          "they move over the object as the camera does.",
       .check_on_rig =
           "Hold a polarising filter before the lens and turn it: highlights fade, matte shading stays.",
       .remedy =

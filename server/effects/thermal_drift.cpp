@@ -1,4 +1,4 @@
-// Thermal drift: fingers and their electronics warm up, and each trigger point wanders through the session.
+// Thermal drift: fingers and their electronics warm up, and each trigger point drifts through the session.
 //   d_i += rate_i * session time,  sum of the rates 0
 #include "server/effects/define_effect.h"
 
@@ -30,7 +30,7 @@ model::Effect ThermalDrift() {
   return DefineEffect<Parameters>({
       .name = "thermal_drift",
       .stage = model::Stage::kSensor,
-      .meaning = "The fingers' trigger points wander apart while the rig warms up.",
+      .meaning = "The fingers' trigger points drift apart while the rig warms up.",
       .signature =
           "The error of each finger grows in a straight line with session_time_s and starts anew with every "
           "session; without session times it looks like too much noise.",

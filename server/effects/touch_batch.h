@@ -90,8 +90,8 @@ class TouchBatch {
   double clock_factor = 1;            // reported over true time
   double poll_interval_s = 0;         // 0: no polling
   double missed_probability = 0;      // per finger and touch
-  double wander_sigma_s = 0;          // noise with memory: standard deviation of a finger's wander,
-  double wander_time_s = 0;           // and how long it remembers
+  double wander_sigma_s = 0;          // noise with memory: standard deviation of a finger's,
+  double wander_time_s = 0;           // and its correlation time
 
   // The first formula whose value was not finite, with the touch and the inputs; empty: none. A stage that finds it
   // set after its effects fails the whole batch with this text (INVALID_ARGUMENT).

@@ -90,7 +90,7 @@ enum class EffectRole {
   kNoiseTails,     // degrees of freedom of heavy tails
   kQuantisation,   // readings fall on ticks
   kDropout,        // readings are missing
-  kNoiseMemory,    // a wander in session time, each finger on its own
+  kNoiseMemory,    // correlated in session time, each finger on its own
   kNoiseOfLength,  // standard deviation of where a finger triggers: in time it grows as the speed falls
   kNoiseByFinger,  // what a finger's noise has beyond the others'
   kSmoothError,    // a smooth error of the surface, drawn anew for every object

@@ -1,8 +1,10 @@
 #include "server/model/provenance.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 #include <utility>
@@ -42,10 +44,11 @@ class ProvenanceReader {
       Promotion& promotion = provenance.promotion.emplace();
       TOUCHSTONE_RETURN_IF_ERROR(CheckMap(*promoted, "promoted",
                                           {"set", "sha256", "unit", "rmse_before", "rmse_after",
-                                           "difference_lower", "difference_upper", "before"}));
+                                           "difference_lower", "difference_upper", "hash", "before"}));
       TOUCHSTONE_RETURN_IF_ERROR(ReadSet(*promoted, &promotion.on));
       TOUCHSTONE_RETURN_IF_ERROR(ReadNumber(*promoted, "difference_lower", &promotion.lower));
       TOUCHSTONE_RETURN_IF_ERROR(ReadNumber(*promoted, "difference_upper", &promotion.upper));
+      TOUCHSTONE_RETURN_IF_ERROR(ReadText(*promoted, "hash", &promotion.hash));
       TOUCHSTONE_RETURN_IF_ERROR(ReadText(*promoted, "before", &promotion.before));
     }
     return provenance;
@@ -101,6 +104,13 @@ std::vector<std::string> SetFields(const UsedSet& set) {
   return fields;
 }
 
+// Whether a text comes back byte for byte from a literal block: it begins with a mark, ends with one line end and has none but
+// printable ASCII.
+bool IsBlock(absl::string_view text) {
+  return !text.empty() && text.front() > ' ' && absl::EndsWith(text, "\n") && !absl::EndsWith(text, "\n\n") &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c < 0x7f); });
+}
+
 }  // namespace
 
 absl::StatusOr<Provenance> ProvenanceOf(const YamlNode& node, const std::string& origin) {
@@ -129,10 +139,16 @@ std::string FormatProvenance(const Provenance& provenance) {
   for (const std::string& field : SetFields(promotion.on)) absl::StrAppend(&text, "    ", field, "\n");
   absl::StrAppend(&text, "    difference_lower: ", ShortestNumber(promotion.lower),
                   "\n    difference_upper: ", ShortestNumber(promotion.upper), "\n");
+  if (!promotion.hash.empty()) absl::StrAppend(&text, "    hash: ", YamlText(promotion.hash), "\n");
   if (promotion.before.empty()) return text;
+  if (!IsBlock(promotion.before)) {
+    absl::StrAppend(&text, "    before: ", QuotedYamlText(promotion.before), "\n");
+    return text;
+  }
   absl::StrAppend(&text, "    before: |\n");
-  for (const absl::string_view line : absl::StrSplit(promotion.before, '\n'))
-    if (!line.empty()) absl::StrAppend(&text, "      ", line, "\n");
+  const absl::string_view lines = absl::StripSuffix(promotion.before, "\n");
+  for (const absl::string_view line : absl::StrSplit(lines, '\n'))
+    absl::StrAppend(&text, line.empty() ? "" : "      ", line, "\n");
   return text;
 }
 

@@ -15,7 +15,7 @@ namespace touchstone::model {
 // A measurement set, and the errors of the model before and of this one on it.
 struct UsedSet {
   std::string set;     // its path or name
-  std::string sha256;  // of its file, hex; empty: it was none
+  std::string sha256;  // hex, of what was measured, whatever file it stood in; empty: unknown
   std::string unit;    // of the errors: "us", "grey" or "px"
   double rmse_before = 0, rmse_after = 0;
 };
@@ -23,7 +23,8 @@ struct UsedSet {
 struct Promotion {
   UsedSet on;
   double lower = 0, upper = 0;  // 95 % interval of the difference of the errors, after less before
-  std::string before;           // the model file that this one took the place of, whole
+  std::string before;           // the text of the model file that this one took the place of, whole
+  std::string hash;  // of the model that was promoted: another one was changed since; empty: unknown
 };
 
 struct Provenance {

@@ -55,6 +55,20 @@ TEST(Provenance, IsReadBackAsItWasWritten) {
   EXPECT_EQ(FileOf(*read), FileOf(written));
 }
 
+TEST(Provenance, KeepsTheFileBeforeByteForByte) {
+  for (const char* before :
+       {"touchstone: model/1\n# two lines\n\nname: rig  # comment\n", "a: 1", "a: 1\n\n", "a: 1\r\nb: 2\r\n",
+        "\n a: 1\n", "a: 1\n\tb\n", "a: \"5 \xc2\xb5m\"\n", "# \"quoted\" \\ back\n"}) {
+    Provenance provenance = Promoted();
+    provenance.promotion->before = before;
+    provenance.promotion->hash = "3f9c";
+    const absl::StatusOr<Provenance> read = ReadProvenance(FileOf(provenance), "better.yaml");
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(read->promotion->before, before);
+    EXPECT_EQ(read->promotion->hash, "3f9c");
+  }
+}
+
 // It describes the model, and is no part of its physics.
 TEST(Provenance, ChangesNeitherHashNorModel) {
   const NoEffects none;

@@ -44,7 +44,7 @@ void AddNoise(effects::TouchBatch* batch, TouchWorkspace* workspace) {
 }
 
 // Noise with memory: where in the session a touch is made decides, not its number.
-void AddWander(effects::TouchBatch* batch) {
+void AddCorrelatedNoise(effects::TouchBatch* batch) {
   for (int finger = 0; finger < batch->fingers(); ++finger)
     for (int touch = 0; touch < batch->size(); ++touch)
       batch->reported_time_s[batch->At(finger, touch)] +=
@@ -57,7 +57,7 @@ void AddWander(effects::TouchBatch* batch) {
 
 void ReportTimes(effects::TouchBatch* batch, TouchWorkspace* workspace) {
   if (batch->any_noise) AddNoise(batch, workspace);
-  if (batch->wander_sigma_s > 0) AddWander(batch);
+  if (batch->wander_sigma_s > 0) AddCorrelatedNoise(batch);
   if (batch->clock_factor != 1)
     for (double& time_s : batch->reported_time_s) time_s *= batch->clock_factor;
   if (batch->poll_interval_s > 0) {

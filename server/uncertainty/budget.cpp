@@ -4,6 +4,44 @@
 #include <cmath>
 
 namespace touchstone::uncertainty {
+namespace {
+
+constexpr double kMisfitP = 0.05;
+
+void SortByShare(std::vector<Contribution>* contributions) {
+  std::stable_sort(contributions->begin(), contributions->end(),
+                   [](const Contribution& a, const Contribution& b) { return a.share > b.share; });
+}
+
+}  // namespace
+
+void AddContribution(const std::string& name, double std_uncertainty, Budget* budget) {
+  const double before = budget->combined * budget->combined;
+  budget->combined = std::hypot(budget->combined, std_uncertainty);
+  budget->largest = std::hypot(budget->largest, std_uncertainty);
+  const double all = budget->combined * budget->combined;
+  if (!(all > 0)) return;
+  for (Contribution& contribution : budget->contributions) contribution.share *= before / all;
+  budget->contributions.push_back({name, std_uncertainty, std_uncertainty * std_uncertainty / all});
+  SortByShare(&budget->contributions);
+}
+
+void AddMisfit(const ModelError& error, double share, std::vector<Budget>* budgets) {
+  if (budgets->empty() || !(error.rmse > error.noise) || !(error.lack_of_fit_p < kMisfitP)) return;
+  const double combined = budgets->back().combined;
+  const double left = error.rmse * error.rmse * share - combined * combined;
+  if (!(left > 0)) return;
+  for (Budget& budget : *budgets) AddContribution("misfit", std::sqrt(left), &budget);
+}
+
+Budget Scaled(Budget budget, double factor) {
+  for (double* value :
+       {&budget.parameters, &budget.surface, &budget.repeatability, &budget.combined, &budget.largest})
+    *value *= factor;
+  if (budget.reproducibility) *budget.reproducibility *= factor;
+  for (Contribution& contribution : budget.contributions) contribution.std_uncertainty *= factor;
+  return budget;
+}
 
 void BudgetSum::Add(const std::string& object, const TimeUncertainty& touches) {
   Sums& sums = objects_[object];
@@ -36,13 +74,13 @@ Budget BudgetSum::BudgetOf(const std::string& object, const Sums& sums) const {
   budget.beyond_measured = sums.beyond;
   if (sums.fingers == 0) return budget;
   const auto root = [&sums](double sum) { return std::sqrt(sum / sums.fingers); };
-  budget.parameters_s = root(sums.parameters);
-  budget.surface_s = root(sums.surface);
-  budget.repeatability_s = root(sums.repeatability);
-  if (has_reproducibility_) budget.reproducibility_s = root(sums.reproducibility);
+  budget.parameters = root(sums.parameters);
+  budget.surface = root(sums.surface);
+  budget.repeatability = root(sums.repeatability);
+  if (has_reproducibility_) budget.reproducibility = root(sums.reproducibility);
   const double all = sums.parameters + sums.surface + sums.repeatability + sums.reproducibility;
-  budget.combined_s = root(all);
-  budget.largest_s = sums.largest;
+  budget.combined = root(all);
+  budget.largest = sums.largest;
   const auto add = [&](const std::string& name, double sum) {
     budget.contributions.push_back({name, root(sum), all > 0 ? sum / all : 0});
   };
@@ -50,8 +88,7 @@ Budget BudgetSum::BudgetOf(const std::string& object, const Sums& sums) const {
   add("surface", sums.surface);
   add("repeatability", sums.repeatability);
   if (has_reproducibility_) add("reproducibility", sums.reproducibility);
-  std::stable_sort(budget.contributions.begin(), budget.contributions.end(),
-                   [](const Contribution& a, const Contribution& b) { return a.share > b.share; });
+  SortByShare(&budget.contributions);
   return budget;
 }
 

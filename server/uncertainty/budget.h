@@ -10,22 +10,37 @@
 namespace touchstone::uncertainty {
 
 struct Contribution {
-  std::string name;  // an effect, "surface", "repeatability", "reproducibility"
-  double std_uncertainty_s = 0;
+  std::string name;  // an effect, "surface", "repeatability", "reproducibility", "misfit"
+  double std_uncertainty = 0;
   double share = 0;  // of the combined variance
 };
 
-// See v1::UncertaintyBudget; seconds.
+// See v1::UncertaintyBudget; in the unit of what is predicted: seconds, grey levels, pixels.
 struct Budget {
   std::string object;  // empty: all
-  int touches = 0;     // of which two fingers or more meet the object
-  double parameters_s = 0, surface_s = 0, repeatability_s = 0;
-  std::optional<double> reproducibility_s;
-  double combined_s = 0;
-  double largest_s = 0;                     // combined, of the worst finger of the worst touch
+  int touches = 0;     // of which two fingers or more meet the object; or pictures
+  double parameters = 0, surface = 0, repeatability = 0;
+  std::optional<double> reproducibility;
+  double combined = 0;
+  double largest = 0;  // combined, of the worst finger of the worst touch; of the worst picture
   std::vector<Contribution> contributions;  // largest first
   int beyond_measured = 0;                  // touches
 };
+
+// A contribution that is independent of the others and the same for every finger; changes the combined ones and all shares.
+void AddContribution(const std::string& name, double std_uncertainty, Budget* budget);
+
+// What a model leaves of the readings that it was fitted to.
+struct ModelError {
+  double rmse = 0, noise = 0;  // one unit
+  double lack_of_fit_p = 1;
+};
+// Adds "misfit", the part of that error which the others do not account for, if the reduced chi square is above 1 and not by
+// chance. `share`: of the error's square that is the error of what is predicted. The last budget is of all.
+void AddMisfit(const ModelError& error, double share, std::vector<Budget>* budgets);
+
+// In another unit, which is `factor` smaller.
+Budget Scaled(Budget budget, double factor);
 
 class BudgetSum {
  public:

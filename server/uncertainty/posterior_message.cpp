@@ -155,16 +155,16 @@ v1::UncertaintyBudget ToMessage(const Budget& budget) {
   v1::UncertaintyBudget message;
   message.set_object(budget.object);
   message.set_touches(static_cast<uint32_t>(budget.touches));
-  message.set_parameters(Microseconds(budget.parameters_s));
-  message.set_surface(Microseconds(budget.surface_s));
-  message.set_repeatability(Microseconds(budget.repeatability_s));
-  if (budget.reproducibility_s) message.set_reproducibility(Microseconds(*budget.reproducibility_s));
-  message.set_combined(Microseconds(budget.combined_s));
-  message.set_largest(Microseconds(budget.largest_s));
+  message.set_parameters(budget.parameters);
+  message.set_surface(budget.surface);
+  message.set_repeatability(budget.repeatability);
+  if (budget.reproducibility) message.set_reproducibility(*budget.reproducibility);
+  message.set_combined(budget.combined);
+  message.set_largest(budget.largest);
   for (const Contribution& contribution : budget.contributions) {
     v1::UncertaintyBudget::Contribution* to = message.add_contributions();
     to->set_name(contribution.name);
-    to->set_std_uncertainty(Microseconds(contribution.std_uncertainty_s));
+    to->set_std_uncertainty(contribution.std_uncertainty);
     to->set_share(contribution.share);
   }
   message.set_beyond_measured(static_cast<uint32_t>(budget.beyond_measured));

@@ -178,9 +178,9 @@ TEST(Budget, AddsVariancesObjectByObject) {
   EXPECT_EQ(budgets[2].object, "");
   EXPECT_EQ(budgets[2].touches, 2);
   EXPECT_EQ(budgets[2].beyond_measured, 2);
-  EXPECT_NEAR(budgets[0].parameters_s, 0.03 * 2e-3 / kSpeed * std::sqrt(2.0 / 3), 1e-6);
-  EXPECT_NEAR(std::pow(budgets[0].combined_s, 2), std::pow(budgets[0].parameters_s, 2) + 9e-6 * 2 / 3, 1e-12);
-  EXPECT_FALSE(budgets[0].reproducibility_s.has_value());
+  EXPECT_NEAR(budgets[0].parameters, 0.03 * 2e-3 / kSpeed * std::sqrt(2.0 / 3), 1e-6);
+  EXPECT_NEAR(std::pow(budgets[0].combined, 2), std::pow(budgets[0].parameters, 2) + 9e-6 * 2 / 3, 1e-12);
+  EXPECT_FALSE(budgets[0].reproducibility.has_value());
   EXPECT_EQ(budgets[0].contributions[0].name, "tool_tilt");
 }
 

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/base/stop_signals.h"
+#include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"
 #include "tests/rig/emulator.h"
 #include "tests/rig/emulator_commands.h"
@@ -125,6 +126,7 @@ int main(int argc, char** argv) {
   tell->add_option("where", where, "HOST:PORT of its control port (emulator.json)")->required();
   tell->add_option("words", words, "What to tell")->required();
   if (touchstone::service::PrintedManPage(app, argc, argv)) return 0;
+  app.formatter(std::make_shared<touchstone::service::HelpLayout>());
   // Faces begin with a sign: these words are not searched for options.
   const bool telling = argc >= 4 && std::string(argv[1]) == "tell";
   if (telling) where = argv[2], words.assign(argv + 3, argv + argc);

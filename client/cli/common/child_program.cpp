@@ -8,10 +8,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <thread>
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
@@ -40,11 +42,13 @@ std::string EndOfLog(const std::string& log) {
 }
 
 // What the new process does: only calls that are safe after fork in a program with threads.
-[[noreturn]] void BecomeProgram(const char* path, char* const* arguments, int input, int log, pid_t parent) {
+[[noreturn]] void BecomeProgram(const char* path, char* const* arguments, const char* folder, int input,
+                                int log, pid_t parent) {
   // A terminal's Ctrl-C is for the parent, which then asks its programs to end, once.
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (::getppid() != parent) ::_exit(1);
+  if (folder[0] != '\0' && ::chdir(folder) != 0) ::_exit(127);
   ::dup2(input, STDIN_FILENO);
   if (log >= 0) {
     ::dup2(log, STDOUT_FILENO);
@@ -61,6 +65,25 @@ std::string PathBesideThisProgram(const std::string& name) {
   return (fs::read_symlink("/proc/self/exe", error).parent_path() / name).string();
 }
 
+absl::StatusOr<std::string> PathOfProgram(const std::string& program) {
+  std::error_code error;
+  const auto runs = [&error](const fs::path& path) {
+    return fs::is_regular_file(path, error) && ::access(path.c_str(), X_OK) == 0;
+  };
+  if (absl::StrContains(program, "/")) {
+    if (runs(program)) return fs::absolute(program).string();
+    return absl::NotFoundError(absl::StrCat(program, fs::exists(program, error)
+                                                         ? ": is no executable file (chmod +x)"
+                                                         : ": there is no such program"));
+  }
+  const char* const path = std::getenv("PATH");
+  for (const absl::string_view folder : absl::StrSplit(path == nullptr ? "" : path, ':'))
+    if (const fs::path at = fs::path(std::string(folder)) / program; runs(at))
+      return fs::absolute(at).string();
+  return absl::NotFoundError(
+      absl::StrCat(program, ": no such program in PATH; of one in this folder say ./", program));
+}
+
 absl::StatusOr<std::unique_ptr<ChildProgram>> ChildProgram::Start(const std::string& name,
                                                                   const std::vector<std::string>& arguments,
                                                                   const std::string& log) {
@@ -68,6 +91,14 @@ absl::StatusOr<std::unique_ptr<ChildProgram>> ChildProgram::Start(const std::str
   if (::access(path.c_str(), X_OK) != 0)
     return absl::NotFoundError(
         absl::StrCat(path, " is needed and is not there; install all programs in one folder"));
+  return StartAt(path, arguments, log, "");
+}
+
+absl::StatusOr<std::unique_ptr<ChildProgram>> ChildProgram::StartAt(const std::string& path,
+                                                                    const std::vector<std::string>& arguments,
+                                                                    const std::string& log,
+                                                                    const std::string& folder) {
+  const std::string name = fs::path(path).filename().string();
   std::vector<char*> words = {const_cast<char*>(name.c_str())};
   for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);
@@ -76,7 +107,7 @@ absl::StatusOr<std::unique_ptr<ChildProgram>> ChildProgram::Start(const std::str
   if (!log.empty() && output < 0)
     return absl::FailedPreconditionError(absl::StrCat(log, ": cannot be written: ", std::strerror(errno)));
   const pid_t parent = ::getpid(), pid = ::fork();
-  if (pid == 0) BecomeProgram(path.c_str(), words.data(), input, output, parent);
+  if (pid == 0) BecomeProgram(path.c_str(), words.data(), folder.c_str(), input, output, parent);
   ::close(input);
   if (output >= 0) ::close(output);
   if (pid < 0)
@@ -130,6 +161,21 @@ absl::Status ChildProgram::Wait() {
     std::this_thread::sleep_for(kLookEvery);
   }
   return asked ? absl::CancelledError("interrupted") : StatusOfEnd();
+}
+
+absl::StatusOr<int> ChildProgram::WaitForExit(double limit_s) {
+  const Clock::time_point until =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(limit_s));
+  while (!HasEnded() && !Interrupt::Raised() && Clock::now() < until) std::this_thread::sleep_for(kLookEvery);
+  const bool in_time = HasEnded();
+  ::kill(-pid_, SIGKILL);  // its group: what it has started
+  if (!in_time) {
+    Stop().IgnoreError();
+    if (Interrupt::Raised()) return absl::CancelledError("interrupted");
+    return absl::DeadlineExceededError(absl::StrCat(name_, " has not ended after ", limit_s, " s"));
+  }
+  if (WIFEXITED(end_)) return WEXITSTATUS(end_);
+  return StatusOfEnd();
 }
 
 absl::Status ChildProgram::Stop() {

@@ -13,6 +13,8 @@ namespace touchstone::cli {
 
 // Path of the program of this name in the folder of this one; it need not be there.
 std::string PathBesideThisProgram(const std::string& name);
+// Absolute path of a program as a shell finds it: a path, or a name in PATH. NOT_FOUND if it is not there or not executable.
+absl::StatusOr<std::string> PathOfProgram(const std::string& program);
 
 class ChildProgram {
  public:
@@ -21,6 +23,11 @@ class ChildProgram {
   static absl::StatusOr<std::unique_ptr<ChildProgram>> Start(const std::string& name,
                                                              const std::vector<std::string>& arguments,
                                                              const std::string& log);
+  // Another program, at `path`, in the folder `folder`. NOT_FOUND if it cannot be executed.
+  static absl::StatusOr<std::unique_ptr<ChildProgram>> StartAt(const std::string& path,
+                                                               const std::vector<std::string>& arguments,
+                                                               const std::string& log,
+                                                               const std::string& folder);
   ~ChildProgram();  // as Stop
   ChildProgram(const ChildProgram&) = delete;
   ChildProgram& operator=(const ChildProgram&) = delete;
@@ -32,6 +39,10 @@ class ChildProgram {
   // Until it ends by itself, or is asked to since this process is interrupted. FAILED_PRECONDITION if its exit status is not
   // 0, CANCELLED after an interruption.
   absl::Status Wait();
+
+  // The same, and how it ended: its exit status. DEADLINE_EXCEEDED after so many seconds, FAILED_PRECONDITION after a signal.
+  // Then all that it has started is killed.
+  absl::StatusOr<int> WaitForExit(double limit_s);
 
   // Asks it to end (SIGTERM) and waits; after 20 s it is killed. FAILED_PRECONDITION if its exit status is not 0.
   absl::Status Stop();

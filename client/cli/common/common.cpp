@@ -115,13 +115,20 @@ absl::StatusOr<std::string> OneOf(const std::string& name, const std::string& te
   return absl::InvalidArgumentError(absl::StrCat(name, ": '", text, "' is unknown", DidYouMean(text, known)));
 }
 
+constexpr size_t kBelow = 4;  // where a column begins that stands below its row
+
 std::string Table::Text() const {
-  const std::vector<size_t> widths = Widths();
+  std::vector<size_t> widths = Widths();
+  size_t total = 0;
+  for (const size_t width : widths) total += width + 2;
+  // Without room for all columns the last one stands below its row.
+  const bool last_below = widths.size() > 2 && total > TextWidth() + 2;
+  if (last_below) widths.pop_back();
   std::string text;
   for (const auto& row : rows_) {
     std::vector<std::vector<std::string>> cells;
     size_t lines = 1;
-    for (size_t i = 0; i < row.size(); ++i) {
+    for (size_t i = 0; i < std::min(row.size(), widths.size()); ++i) {
       cells.push_back(absl::StrSplit(Wrap(row[i], widths[i], 0), '\n'));
       lines = std::max(lines, cells.back().size());
     }
@@ -135,6 +142,8 @@ std::string Table::Text() const {
       shown.erase(shown.find_last_not_of(' ') + 1);
       absl::StrAppend(&text, shown, "\n");
     }
+    if (last_below && row.size() > widths.size())
+      absl::StrAppend(&text, std::string(kBelow, ' '), Wrap(row.back(), TextWidth(), kBelow), "\n");
   }
   return text;
 }
@@ -160,34 +169,6 @@ std::vector<size_t> Table::Widths() const {
     --*widest;
   }
   return widths;
-}
-
-std::string Wrap(absl::string_view text, size_t width, size_t indent) {
-  std::string result;
-  size_t column = indent;
-  std::vector<absl::string_view> words = absl::StrSplit(text, ' ', absl::SkipEmpty());
-  for (size_t k = 0; k < words.size(); ++k) {
-    // A word that no line has room for is broken behind a comma or a bar.
-    if (indent + words[k].size() > width) {
-      const size_t room = width - std::min(width, indent);
-      if (const size_t at = words[k].substr(0, room).find_last_of(",|"); at != absl::string_view::npos) {
-        const absl::string_view rest = words[k].substr(at + 1);
-        words[k] = words[k].substr(0, at + 1);
-        words.insert(words.begin() + static_cast<std::ptrdiff_t>(k) + 1, rest);
-      }
-    }
-    const absl::string_view word = words[k];
-    if (column > indent && column + 1 + word.size() > width) {
-      absl::StrAppend(&result, "\n", std::string(indent, ' '));
-      column = indent;
-    } else if (column > indent) {
-      result += ' ';
-      ++column;
-    }
-    absl::StrAppend(&result, word);
-    column += word.size();
-  }
-  return result;
 }
 
 std::string Rounded(double value) {

@@ -192,10 +192,6 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-// Text broken into lines of at most `width` columns, all but the first indented. Words stay whole, but for one that a line has
-// no room for.
-std::string Wrap(absl::string_view text, size_t width, size_t indent);
-
 // Four significant digits, for people: "0.05", "149.9", "1.2e-06", "21860".
 std::string Rounded(double value);
 

@@ -1,15 +1,9 @@
-// The terminal that a command prints to: its width, its colours.
+// The terminal that a command prints to: its width (server/base/wrapped_text.h), its colours.
 #pragma once
 
-#include <cstddef>
+#include "server/base/wrapped_text.h"
 
 namespace touchstone::cli {
-
-// Columns of standard output, from 60 to 160; 110 where it is no terminal.
-int TerminalWidth();
-
-// The same for text, whose lines are at most 110 columns.
-size_t TextWidth();
 
 // Whether standard output is a terminal.
 bool OnTerminal();

@@ -1,7 +1,5 @@
 #include "client/cli/diagnosis/board.h"
 
-#include <filesystem>
-
 #include "client/cli/options/model_output.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
@@ -84,13 +82,11 @@ absl::Status RunBoardDiagnosis(const Cli& cli, const ComparisonOptions& options,
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
   if (!board.save_camera.empty()) TOUCHSTONE_RETURN_IF_ERROR(SaveCamera(cli, board.save_camera, diagnosis));
   if (save_model.empty()) return absl::OkStatus();
-  model::Model improved = model;
-  if (diagnosis.improved_model) {
-    improved = *diagnosis.improved_model;
-    improved.name = std::filesystem::path(save_model).stem().string();
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, "--save-model", save_model, improved));
-  cli.LogWritten(save_model, absl::StrCat(" (hash ", improved.Hash().substr(0, 12), ")"));
+  const std::string& improved = report.improved_model_yaml();
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model written,
+                              WriteModelText(cli, "--save-model", save_model,
+                                             improved.empty() ? model::FormatModel(model) : improved));
+  cli.LogWritten(save_model, absl::StrCat(" (hash ", written.Hash().substr(0, 12), ")"));
   return absl::OkStatus();
 }
 

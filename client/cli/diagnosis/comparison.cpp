@@ -10,7 +10,7 @@
 #include <random>
 
 #include "client/cli/common/terminal.h"
-#include "client/cli/session/named_set.h"
+#include "client/cli/session/images.h"
 #include "client/cli/session/set_meshes.h"
 #include "client/report/report.h"
 #include "client/workbench/page.h"
@@ -21,6 +21,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/calls/evidence.h"
+#include "server/session/touch_content.h"
 
 namespace touchstone::cli {
 namespace {
@@ -164,6 +165,9 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   if (served) TOUCHSTONE_RETURN_IF_ERROR(comparison->SendMeshes(meshes));
   comparison->meshes_ = std::move(meshes);
   NamedSet& first = sets[0];
+  if (options.with_content_hash) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(comparison->content_sha256_, comparison->ContentSha256Of(first));
+  }
   if (!first.csv.empty() && !first.images) comparison->set_sha256_ = Sha256Hex(first.csv);
   if (first.images) {
     comparison->set_sha256_ = first.images_sha256;
@@ -196,6 +200,21 @@ absl::StatusOr<std::vector<std::string>> Comparison::ObjectsOfStored(const std::
         absl::StrCat("SET: ", session, " is no file, and at the server ", stored.status().message()));
   TOUCHSTONE_RETURN_IF_ERROR(stored.status());
   return std::vector<std::string>(stored->objects().begin(), stored->objects().end());
+}
+
+absl::StatusOr<std::string> Comparison::ContentSha256Of(const NamedSet& set) const {
+  if (set.measured) return session::TouchContentSha256(*set.measured);
+  std::string csv = set.csv;
+  if (!set.session.empty()) {
+    std::string left_out;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const service::StoredSession stored,
+                                FetchSession(connection_.get(), set.session, &left_out));
+    csv = stored.csv;
+  }
+  if (csv.empty()) return set.images_sha256;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::MeasurementSet touches,
+                              session::ParseMeasurementSet(csv, evidence_.origin()));
+  return session::TouchContentSha256(touches);
 }
 
 Comparison::~Comparison() {

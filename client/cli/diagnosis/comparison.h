@@ -12,6 +12,7 @@
 #include "client/cli/common/interrupt.h"
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/common/provenance.h"
+#include "client/cli/session/named_set.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {
@@ -37,6 +38,7 @@ struct ComparisonOptions {
   bool takes_sets = true;                  // false: the command finds the sets by itself
   bool takes_models = true;                // ... the models, and there are none that compete
   std::string set_name = "SET", set_text;  // as the help has it; empty text: any set
+  bool with_content_hash = false;          // content_sha256() is asked for
   bool further_meshes = false;  // of --mesh-dir also those that the set does not name, up to a bound
 
   std::string set() const { return sets.empty() ? "" : sets[0]; }
@@ -64,6 +66,10 @@ class Comparison {
   const v1::Evidence& evidence() const { return evidence_; }
   // The second of two models, read and checked; none if one was given.
   const std::optional<v1::ModelRef>& other_model() const { return other_model_; }
+  // Of what the first set measured, whatever file it stands in: of its touches, or of photographs without touches.
+  const std::string& content_sha256() const { return content_sha256_; }
+  // Files that were read.
+  const std::vector<source::MeshSpec>& meshes() const { return meshes_; }
   // Sets after the first, as requests take them.
   const std::vector<v1::Evidence>& further() const { return further_; }
 
@@ -88,6 +94,7 @@ class Comparison {
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
   absl::StatusOr<std::vector<std::string>> ObjectsOfStored(const std::string& session);
+  absl::StatusOr<std::string> ContentSha256Of(const NamedSet& set) const;
   absl::Status SendMeshes(const std::vector<source::MeshSpec>& meshes);
   absl::Status AddImages(v1::ImageSetFiles images);
   // What is too large for one request goes ahead as a session, once to each server that is asked.
@@ -103,7 +110,8 @@ class Comparison {
   std::optional<v1::ModelRef> other_model_;
   std::vector<v1::Evidence> further_;
   std::string csv_to_send_ahead_;
-  std::string sent_ahead_;                // the session's name
+  std::string sent_ahead_;  // the session's name
+  std::string content_sha256_;
   std::string set_sha256_;                // of the set's file; empty: it is none here
   std::vector<source::MeshSpec> meshes_;  // files that were read
 };

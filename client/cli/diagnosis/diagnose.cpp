@@ -1,11 +1,8 @@
 // touchstone diagnose: how wrong a model is, where, why, what to add, and what the error becomes.
-#include <filesystem>
-
 #include "client/cli/diagnosis/board.h"
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/options/model_output.h"
 #include "server/base/status.h"
-#include "server/effects/all_effects.h"
 #include "server/model/model.h"
 
 namespace touchstone::cli {
@@ -27,32 +24,14 @@ std::string SuggestedModel(const v1::Report& report) {
   return "";
 }
 
-// What the improved model was fitted to: each set, with the errors of the given model and of this one. `suggested`: with
-// the formula or curve of what no effect explains.
-model::Provenance FittedTo(const v1::Report& report, bool suggested) {
-  model::Provenance provenance;
-  provenance.over_name = report.model_name();
-  provenance.over_hash = report.model_hash();
-  const v1::Provenance& from = report.provenance();
-  for (int i = 0; i < report.data_size(); ++i) {
-    const v1::DataReport& data = report.data(i);
-    if (!(data.initial().rmse() > 0)) continue;
-    model::UsedSet& set = provenance.fitted_to.emplace_back();
-    set.set = data.session();
-    set.sha256 = i < from.session_sha256_size() ? from.session_sha256(i) : i == 0 ? from.set_sha256() : "";
-    set.unit = data.unit();
-    set.rmse_before = data.initial().rmse();
-    set.rmse_after =
-        suggested && data.unexplained().rmse() > 0 ? data.unexplained().rmse() : data.final().rmse();
-  }
-  return provenance;
-}
-
-// The improved model under the file's name, or the model itself where nothing had to change.
+// The improved model as the report has it, or the model itself where nothing had to change.
 absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1::Report& report,
                        Comparison* comparison) {
-  const bool changed = !report.improved_model_yaml().empty();
-  std::string yaml = report.improved_model_yaml();
+  std::string yaml = options.with_formula ? SuggestedModel(report) : "";
+  if (options.with_formula && yaml.empty())
+    cli.Log("--with-formula: this report suggests no formula and no curve");
+  if (yaml.empty()) yaml = report.improved_model_yaml();
+  const bool changed = !yaml.empty();
   if (!changed) {
     v1::GetModelRequest request;
     *request.mutable_model() = comparison->evidence().model();
@@ -60,26 +39,12 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
                                 comparison->connection().Call(&v1::Models::Stub::GetModel, request));
     yaml = same.yaml();
   }
-  const std::string with = options.with_formula ? SuggestedModel(report) : "";
-  if (options.with_formula && with.empty())
-    cli.Log("--with-formula: this report suggests no formula and no curve");
-  const bool suggested = !with.empty();
-  if (suggested) yaml = with;
-  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model,
-                              model::ParseModel(yaml, "the improved model", effects::Catalogue()));
-  // A new model under the old one's name would be refused by a server that knows the old one.
-  const model::Model as_it_was = model;
-  model.name = std::filesystem::path(options.save_model).stem().string();
-  if (!model::ParseModel(model::FormatModel(model), options.save_model, effects::Catalogue()).ok())
-    model.name = as_it_was.name;
-  TOUCHSTONE_RETURN_IF_ERROR(
-      WriteModel(cli, "--save-model", options.save_model, model,
-                 changed || suggested ? FittedTo(report, suggested) : model::Provenance()));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model model,
+                              WriteModelText(cli, "--save-model", options.save_model, yaml));
   const std::string hash = model.Hash().substr(0, 12);
   cli.LogWritten(options.save_model,
-                 changed || suggested
-                     ? absl::StrCat(" (", model.name, ", hash ", hash, ")")
-                     : absl::StrCat(": the same model, nothing had to change (hash ", hash, ")"));
+                 changed ? absl::StrCat(" (", model.name, ", hash ", hash, ")")
+                         : absl::StrCat(": the same model, nothing had to change (hash ", hash, ")"));
   return absl::OkStatus();
 }
 

@@ -2,6 +2,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "client/cli/diagnosis/comparison.h"
@@ -19,17 +20,26 @@ struct PromoteOptions : ComparisonOptions {
 
 // A model file with what it says of itself.
 struct KnownModel {
+  std::string text;
   model::Model model;
   model::Provenance provenance;
 };
 
 absl::StatusOr<KnownModel> ReadKnownModel(const std::string& path) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   KnownModel known;
-  TOUCHSTONE_ASSIGN_OR_RETURN(known.model,
-                              model::ParseModel(text, path, effects::Catalogue(), model::FilesBeside(path)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(known.provenance, model::ReadProvenance(text, path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(known.text, ReadFile(path));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      known.model, model::ParseModel(known.text, path, effects::Catalogue(), model::FilesBeside(path)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(known.provenance, model::ReadProvenance(known.text, path));
   return known;
+}
+
+// The whole file as it stands; one that needs a file beside it (a surface map) with that in it.
+std::string WholeFile(const KnownModel& known) {
+  const bool alone =
+      std::none_of(known.model.effects.begin(), known.model.effects.end(),
+                   [](const model::EffectInstance& one) { return one.effect->surface_map != nullptr; });
+  return alone ? known.text : model::FormatModel(known.model) + model::FormatProvenance(known.provenance);
 }
 
 // An error where the set is one of those that the model was fitted to.
@@ -38,15 +48,15 @@ absl::Status CheckUnseen(const Cli& cli, const PromoteOptions& options, const mo
   for (const model::UsedSet& set : better.fitted_to)
     if (!sha256.empty() && set.sha256 == sha256)
       return absl::InvalidArgumentError(
-          absl::StrCat("--on: ", options.on, " is what ", options.better, " was fitted to (", set.set,
-                       ", SHA-256 ", sha256.substr(0, 12), "...): a set that it has not seen was expected"));
+          absl::StrCat("--on: ", options.on, " holds what ", options.better, " was fitted to (", set.set,
+                       ", content ", sha256.substr(0, 12), "...): a set that it has not seen was expected"));
   if (better.fitted_to.empty())
     cli.Log(absl::StrCat("note: ", options.better,
                          " does not say what it was fitted to: that it has not seen ", options.on,
                          " cannot be checked"));
   else if (sha256.empty())
-    cli.Log(absl::StrCat("note: ", options.on, " is no file: that ", options.better,
-                         " has not seen it cannot be checked"));
+    cli.Log(absl::StrCat("note: of the stored photographs ", options.on, " it is not known here whether ",
+                         options.better, " has seen them"));
   return absl::OkStatus();
 }
 
@@ -64,14 +74,17 @@ absl::Status NotPromoted(const PromoteOptions& options, const v1::DataReport& da
                    Milliseconds(versus.upper()), versus.lower() > 0 ? ", lies above 0" : ", holds 0"));
 }
 
-absl::StatusOr<v1::Report> CompareOn(const Cli& cli, const PromoteOptions& options) {
+// The report, and the hash of what was measured.
+absl::StatusOr<std::pair<v1::Report, std::string>> CompareOn(const Cli& cli, const PromoteOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::CompareRequest request;
-  return comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
-    *request.mutable_evidence() = comparison->evidence();
-    *request.mutable_other_model() = *comparison->other_model();
-    return comparison->connection().diagnosis().Compare(context, request);
-  });
+  TOUCHSTONE_ASSIGN_OR_RETURN(v1::Report report,
+                              comparison->Run<v1::CompareResponse>([&](grpc::ClientContext* context) {
+                                *request.mutable_evidence() = comparison->evidence();
+                                *request.mutable_other_model() = *comparison->other_model();
+                                return comparison->connection().diagnosis().Compare(context, request);
+                              }));
+  return std::pair(std::move(report), comparison->content_sha256());
 }
 
 absl::Status RunPromote(const Cli& cli, PromoteOptions options) {
@@ -83,8 +96,9 @@ absl::Status RunPromote(const Cli& cli, PromoteOptions options) {
                                                    "): there is nothing to promote"));
   options.sets = {options.on};
   options.models = {options.over, options.better};
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report, CompareOn(cli, options));
-  const std::string& sha256 = report.provenance().set_sha256();
+  options.with_content_hash = true;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto compared, CompareOn(cli, options));
+  const auto& [report, sha256] = compared;
   TOUCHSTONE_RETURN_IF_ERROR(CheckUnseen(cli, options, better.provenance, sha256));
   if (report.data_size() == 0 || !report.data(0).has_versus())
     return absl::InvalidArgumentError(
@@ -100,7 +114,8 @@ absl::Status RunPromote(const Cli& cli, PromoteOptions options) {
   promotion.on = {options.on, sha256, data.unit(), data.initial().rmse(), versus.other().rmse()};
   promotion.lower = versus.lower();
   promotion.upper = versus.upper();
-  promotion.before = model::FormatModel(over.model) + model::FormatProvenance(over.provenance);
+  promotion.hash = better.model.Hash();
+  promotion.before = WholeFile(over);
   if (!options.output.empty() && !IsStandardOutput(options.output))
     better.model.name = std::filesystem::path(options.output).stem().string();
   TOUCHSTONE_RETURN_IF_ERROR(
@@ -118,7 +133,18 @@ absl::Status RunDemote(const Cli& cli, const PromoteOptions& options) {
         options.better, " was not promoted over another model: it holds none that could be restored"));
   const std::string& before = promoted.provenance.promotion->before;
   const std::string place = absl::StrCat(options.better, ": provenance.promoted.before");
-  TOUCHSTONE_RETURN_IF_ERROR(model::ParseModel(before, place, effects::Catalogue()).status());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model restored,
+                              model::ParseModel(before, place, effects::Catalogue()));
+  const std::string& over = promoted.provenance.over_hash;
+  if (!over.empty() && restored.Hash() != over)
+    return absl::FailedPreconditionError(
+        absl::StrCat(place, " was changed: its model has the hash ", restored.Hash().substr(0, 12),
+                     ", and the one before had ", over.substr(0, 12), "; nothing is written"));
+  const std::string &hash = promoted.provenance.promotion->hash, now = promoted.model.Hash();
+  if (!hash.empty() && hash != now)
+    cli.Log(absl::StrCat("note: ", options.better, " was changed since it was promoted (hash ",
+                         now.substr(0, 12), ", promoted ", hash.substr(0, 12),
+                         "): the change is not in what is restored"));
   TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.output, before));
   if (!options.output.empty())
     cli.LogWritten(options.output, absl::StrCat(" (", promoted.provenance.over_name, ", as it was before)"));

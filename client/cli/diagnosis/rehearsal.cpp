@@ -80,7 +80,7 @@ double TruthOf(const RehearsedCase& hidden, const std::string& effect, const v1:
 absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, const v1::Report& check,
                                                      const HiddenSize& size,
                                                      const std::vector<std::string>& only, int pairs,
-                                                     uint64_t seed) {
+                                                     uint64_t seed, int sessions) {
   std::vector<std::string> names;
   for (const v1::DetectableEffect& value : check.detectable())
     if (names.empty() || names.back() != value.effect()) names.push_back(value.effect());
@@ -120,8 +120,37 @@ absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, 
                        effects::Catalogue()));
   cases.push_back({"outside", {}, std::move(outside), true});
   cases.push_back({"mistake", {}, given, false, true});
+  for (size_t i = 0; sessions > 1 && i < names.size(); ++i) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model, Hiding(given, *FirstOf(check, names[i]), size));
+    cases.push_back({absl::StrCat(names[i], " changed"), {names[i]}, std::move(model), false, false, true});
+  }
+  for (RehearsedCase& one : cases) one.given = given;
   return cases;
 }
+
+namespace {
+
+bool Names(const v1::ComparedEffect& compared, const std::string& effect) {
+  return compared.effect() == effect ||
+         std::count(compared.equivalent().begin(), compared.equivalent().end(), effect) > 0;
+}
+
+// Of several sessions: what is said to have changed.
+void AssessChanges(const RehearsedCase& hidden, const v1::Report& report, RehearsedSet* set) {
+  bool found = false;
+  for (const v1::ComparedEffect& compared : report.sessions().effects()) {
+    if (compared.change() != v1::ComparedEffect::CHANGED) continue;
+    const bool is_hidden =
+        hidden.last_only && std::any_of(hidden.effects.begin(), hidden.effects.end(),
+                                        [&](const std::string& effect) { return Names(compared, effect); });
+    found |= is_hidden;
+    set->false_claim |= !is_hidden;
+    set->confident |= !is_hidden;
+  }
+  if (hidden.last_only) set->found = found;
+}
+
+}  // namespace
 
 RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
   RehearsedSet set;
@@ -138,7 +167,8 @@ RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
     const bool made_up = !is_hidden && !effects::Catalogue().Find(step.effect())->random();
     set.false_claim |= made_up;
     set.confident |= made_up && step.probability() >= kConfident;
-    if (std::find(hidden.effects.begin(), hidden.effects.end(), step.effect()) == hidden.effects.end())
+    if (hidden.last_only ||
+        std::find(hidden.effects.begin(), hidden.effects.end(), step.effect()) == hidden.effects.end())
       continue;
     for (const v1::ParameterValue& value : step.parameters()) {
       const double truth = TruthOf(hidden, step.effect(), value);
@@ -146,6 +176,7 @@ RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
         set.z.push_back((value.value() - truth) / value.std_error());
     }
   }
+  AssessChanges(hidden, report, &set);
   const bool checks = report.verdict() == v1::Report::CHECK_DATA;
   set.confident |= checks && !hidden.is_mistake;
   if (hidden.is_mistake)
@@ -158,6 +189,7 @@ RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
 }
 
 Json ToJson(const RehearsedSet& set) {
+  if (set.left_out) return {{"case", set.name}, {"left_out", true}};
   return {{"case", set.name},           {"found", set.found},
           {"right", set.right},         {"false_claim", set.false_claim},
           {"confident", set.confident}, {"z", set.z}};
@@ -167,6 +199,8 @@ absl::StatusOr<RehearsedSet> SetFromJson(const Json& json) {
   RehearsedSet set;
   try {
     json.at("case").get_to(set.name);
+    set.left_out = json.value("left_out", false);
+    if (set.left_out) return set;
     json.at("found").get_to(set.found);
     json.at("right").get_to(set.right);
     json.at("false_claim").get_to(set.false_claim);
@@ -201,10 +235,11 @@ std::vector<RehearsalRow> Summarise(const std::vector<RehearsedCase>& cases,
     rows.push_back({one.name});
     rows.back().predicted = one.predicted;
     for (const RehearsedSet& set : sets)
-      if (set.name == one.name) add(set, &rows.back());
+      if (set.name == one.name && !set.left_out) add(set, &rows.back());
   }
   rows.push_back({"all"});
-  for (const RehearsedSet& set : sets) add(set, &rows.back());
+  for (const RehearsedSet& set : sets)
+    if (!set.left_out) add(set, &rows.back());
   for (RehearsalRow& row : rows) {
     if (row.values == 0) continue;
     row.mean_z /= row.values;

@@ -14,14 +14,23 @@
 
 namespace touchstone::cli {
 
-// What is hidden: nothing, an effect, two, a cause of no catalogue ("outside"), a mistake of the file ("mistake").
+// What is hidden: nothing, an effect, two, a cause of no catalogue ("outside"), a mistake of the file ("mistake"). In every
+// session of a set, or in the last one alone: then it has changed.
 struct RehearsedCase {
-  std::string name;  // "nothing", "tip_radius", "tip_radius+gravity_sag", "outside", "mistake"
+  std::string
+      name;  // "nothing", "tip_radius", "tip_radius+gravity_sag", "outside", "mistake", "tip_radius changed"
   std::vector<std::string> effects;  // of the catalogue that are hidden
   model::Model model;                // that touches
   bool is_outside = false;
   bool is_mistake = false;  // two fingers are exchanged in the file
+  bool last_only = false;   // hidden in the last session alone; so is every mistake
+  model::Model given;       // that is diagnosed
   double predicted = -1;    // chance that a check gives for the effect to be found; < 0: none
+
+  bool IsHiddenIn(int session, int sessions) const { return !last_only || session == sessions - 1; }
+  const model::Model& ModelOf(int session, int sessions) const {
+    return IsHiddenIn(session, sessions) ? model : given;
+  }
 };
 
 // How large a hidden effect is: so many times what rigs usually show, or where a check says that it is found in 80 %.
@@ -31,12 +40,12 @@ struct HiddenSize {
 };
 
 // Of the given model: nothing, every effect of `check`.detectable (its first value alone, the others change nothing), as many
-// pairs as `pairs` (drawn by `seed`), outside, mistake. `only`: names of the effects; empty: all. Errors: a name that the
+// pairs as `pairs` (drawn by `seed`), outside, mistake; of several sessions also every effect in the last alone. `only`: names of the effects; empty: all. Errors: a name that the
 // check has not.
 absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, const v1::Report& check,
                                                      const HiddenSize& size,
                                                      const std::vector<std::string>& only, int pairs,
-                                                     uint64_t seed);
+                                                     uint64_t seed, int sessions = 1);
 
 // One diagnosed set.
 struct RehearsedSet {
@@ -45,9 +54,11 @@ struct RehearsedSet {
   bool right =
       false;  // that, and nothing else; ADEQUATE of nothing; CHECK_DATA of a mistake; UNEXPLAINED of what is
               // outside
-  bool false_claim = false;  // a step without a hidden effect
-  bool confident = false;    // ... with a probability of at least 0.9, or CHECK_DATA without a mistake
-  std::vector<double> z;     // (estimate - truth) / standard error of hidden values that were fitted
+  bool false_claim =
+      false;  // a step without a hidden effect, or, of several sessions, a change that was not hidden
+  bool confident = false;  // ... with a probability of at least 0.9, or CHECK_DATA without a mistake
+  std::vector<double> z;   // (estimate - truth) / standard error of hidden values that were fitted
+  bool left_out = false;   // it could not be hidden: nothing else is known
   bool honest() const { return !false_claim && !confident; }
 };
 RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report);

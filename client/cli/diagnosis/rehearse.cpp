@@ -1,17 +1,17 @@
 // touchstone rehearse: how well a diagnosis of such a plan does, by sets in which something is hidden.
 #include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/diagnosis/rehearsal.h"
+#include "client/cli/diagnosis/rehearsal_state.h"
+#include "client/cli/diagnosis/rehearsed_files.h"
 #include "client/source/measurement_csv.h"
-#include "client/source/session_parts.h"
-#include "server/base/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/effects/all_effects.h"
@@ -26,6 +26,7 @@ struct RehearseOptions : ComparisonOptions {
   std::string effects;
   uint32_t pairs = 2;
   std::string state;
+  GeneratorOptions generator;
 };
 
 absl::StatusOr<HiddenSize> ParseSize(const std::string& text) {
@@ -42,80 +43,6 @@ absl::StatusOr<HiddenSize> ParseSize(const std::string& text) {
   return size;
 }
 
-// Rehearsed sets in a file, a line each, so that a rehearsal goes on where it was stopped. The first line says of what.
-class RehearsalState {
- public:
-  // Reads what there is. Error: it is of another rehearsal.
-  static absl::StatusOr<RehearsalState> Open(const std::string& path, const Json& of) {
-    RehearsalState state;
-    state.path_ = path;
-    if (path.empty()) return state;
-    std::ifstream file(path);
-    std::string line;
-    for (int number = 1; std::getline(file, line); ++number) {
-      const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
-      if (number == 1) {
-        if (json != of)
-          return absl::FailedPreconditionError(
-              absl::StrCat("--state: ", path,
-                           " is of another plan, model, seed or size; another file, or none, was expected"));
-        continue;
-      }
-      if (json.is_discarded() && file.peek() == EOF) break;  // cut by what stopped it: made again
-      absl::StatusOr<RehearsedSet> set = SetFromJson(json);
-      if (!set.ok())
-        return absl::Status(set.status().code(),
-                            absl::StrCat(path, ":", number, ": ", set.status().message()));
-      state.sets_.push_back(*std::move(set));
-    }
-    state.text_ = of.dump() + "\n";
-    for (const RehearsedSet& set : state.sets_) absl::StrAppend(&state.text_, ToJson(set).dump(), "\n");
-    TOUCHSTONE_RETURN_IF_ERROR(state.Write());
-    return state;
-  }
-
-  absl::Status Add(RehearsedSet set) {
-    sets_.push_back(std::move(set));
-    if (path_.empty()) return absl::OkStatus();
-    absl::StrAppend(&text_, ToJson(sets_.back()).dump(), "\n");
-    return Write();
-  }
-  const std::vector<RehearsedSet>& sets() const { return sets_; }
-
- private:
-  // Whole, beside what it replaces: what was rehearsed before outlives a disk that fails and a kill.
-  absl::Status Write() const {
-    const absl::Status written = WriteFileAtomically(path_, text_);
-    return absl::Status(written.code(), written.ok() ? "" : absl::StrCat("--state: ", written.message()));
-  }
-
-  std::string path_, text_;  // where, and what stands there
-  std::vector<RehearsedSet> sets_;
-};
-
-// The plan's touches under a model, as a measurement file.
-absl::StatusOr<std::string> TouchPlan(const std::vector<client::MeasuredTouch>& plan,
-                                      const RehearsedCase& hidden, uint64_t seed,
-                                      client::Connection* connection) {
-  std::vector<client::MeasuredTouch> measured = plan;
-  constexpr size_t kPerRequest = 1000;
-  for (size_t first = 0, stop = 0; first < measured.size(); first = stop) {
-    v1::TouchRequest request = client::PartOfSession(measured, first, kPerRequest);
-    stop = first + static_cast<size_t>(request.touches_size());
-    request.mutable_model()->set_yaml(model::FormatModel(hidden.model));
-    request.set_seed(seed);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const v1::TouchResponse response,
-                                connection->Call(&v1::Source::Stub::Touch, request));
-    for (size_t k = first; k < stop; ++k) {
-      const auto& time_s = response.results(static_cast<int>(k - first)).contact_time_s();
-      measured[k].time_s.assign(time_s.begin(), time_s.end());
-      if (hidden.is_mistake && measured[k].time_s.size() > 1)
-        std::swap(measured[k].time_s[0], measured[k].time_s[1]);
-    }
-  }
-  return client::FormatMeasurements(measured);
-}
-
 std::string SharePercent(int count, int of) {
   if (of == 0) return "-";
   const Interval95 interval = IntervalOf(count, of);
@@ -123,7 +50,8 @@ std::string SharePercent(int count, int of) {
                          100 * interval.upper);
 }
 
-std::string SummaryText(const std::vector<RehearsalRow>& rows) {
+std::string SummaryText(const std::vector<RehearsalRow>& rows, const std::string& generator,
+                        const std::vector<std::string>& left_out) {
   Table table(
       {"HIDDEN", "SETS", "FOUND", "CHECK SAYS", "RIGHT", "CONFIDENTLY WRONG", "COVERAGE", "BIAS", "SPREAD"});
   for (const RehearsalRow& row : rows) {
@@ -135,12 +63,16 @@ std::string SummaryText(const std::vector<RehearsalRow>& rows) {
                row.values == 0 ? "" : absl::StrFormat("%+.2f", row.mean_z),
                row.values < 2 ? "" : absl::StrFormat("%.2f", row.spread_z)});
   }
-  return absl::StrCat(table.Text(),
-                      "\nIn brackets: 95 % intervals. Coverage: hidden values within the 95 % interval that "
-                      "was reported. Bias and spread: of\n"
-                      "(value - truth) / standard error; 0 and 1 are right. The simulation that hides is the "
-                      "one that diagnoses: what it\n"
-                      "lacks altogether, this does not show.\n");
+  return absl::StrCat(
+      table.Text(),
+      "\nIn brackets: 95 % intervals. Coverage: hidden values within the 95 % interval that "
+      "was reported. Bias and spread: of\n"
+      "(value - truth) / standard error; 0 and 1 are right. ",
+      generator.empty() ? "The simulation that hides is the one that diagnoses: what it\n"
+                          "lacks altogether, this does not show.\n"
+                        : absl::StrCat("The sets were made by ", generator, ".\n"),
+      left_out.empty() ? ""
+                       : absl::StrCat("It cannot hide and left out: ", absl::StrJoin(left_out, ", "), ".\n"));
 }
 
 Json SummaryJson(const std::vector<RehearsalRow>& rows) {
@@ -173,9 +105,14 @@ class Rehearsal {
 
   absl::Status Prepare() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const HiddenSize size, ParseSize(options_.size));
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        plan_, client::ParseMeasurements(comparison_->evidence().csv(), comparison_->evidence().origin()));
-    if (plan_.empty()) return absl::InvalidArgumentError("PLAN: has no touch");
+    TOUCHSTONE_RETURN_IF_ERROR(ReadPlans());
+    if (options_.generator.program.empty()) {
+      files_ = SimulatedFiles(&comparison_->connection());
+    } else {
+      GeneratorOptions generator = options_.generator;
+      generator.meshes = comparison_->meshes();
+      TOUCHSTONE_ASSIGN_OR_RETURN(files_, GeneratedFiles(generator));
+    }
     v1::CheckRequest request;
     TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report check,
                                 comparison_->Run<v1::CheckResponse>([&](grpc::ClientContext* context) {
@@ -190,13 +127,15 @@ class Rehearsal {
                                 model::ParseModel(given.yaml(), "the model", effects::Catalogue()));
     const std::vector<std::string> only =
         options_.effects.empty() ? std::vector<std::string>() : absl::StrSplit(options_.effects, ',');
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        cases_, ListCases(model, check, size, only, static_cast<int>(options_.pairs), options_.seed));
+    TOUCHSTONE_ASSIGN_OR_RETURN(cases_, ListCases(model, check, size, only, static_cast<int>(options_.pairs),
+                                                  options_.seed, static_cast<int>(plans_.size())));
     std::vector<std::string> names;
     for (const RehearsedCase& one : cases_) names.push_back(one.name);
-    const Json of = {{"rehearsal", 1},        {"plan", Sha256Hex(comparison_->evidence().csv())},
-                     {"model", given.hash()}, {"size", options_.size},
-                     {"seed", options_.seed}, {"cases", names}};
+    std::string plans = comparison_->evidence().csv();
+    for (const v1::Evidence& further : comparison_->further()) plans += further.csv();
+    Json of = {{"rehearsal", 1},        {"plan", Sha256Hex(plans)}, {"model", given.hash()},
+               {"size", options_.size}, {"seed", options_.seed},    {"cases", names}};
+    if (!options_.generator.program.empty()) of["generator"] = options_.generator.program;
     TOUCHSTONE_ASSIGN_OR_RETURN(state_, RehearsalState::Open(options_.state, of));
     return absl::OkStatus();
   }
@@ -221,11 +160,17 @@ class Rehearsal {
       bar.SetPart(absl::StrCat("set ", n + 1, ", ", hidden.name, " hidden"), share, next);
       bar.ShowStage("touching");
       v1::DiagnoseRequest request;
-      *request.mutable_evidence() = comparison_->evidence();
-      request.mutable_evidence()->set_seed(options_.seed + n);
-      TOUCHSTONE_ASSIGN_OR_RETURN(
-          *request.mutable_evidence()->mutable_csv(),
-          TouchPlan(plan_, hidden, options_.seed + 1 + n, &comparison_->connection()));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool touched, Touch(hidden, n, &request));
+      if (!touched) {
+        RehearsedSet left_out;
+        left_out.name = hidden.name, left_out.left_out = true;
+        TOUCHSTONE_RETURN_IF_ERROR(state_.Add(left_out));
+        if (NothingIsMade())
+          return absl::FailedPreconditionError(
+              absl::StrCat("--generator: ", options_.generator.program, " hides none of the ", cases_.size(),
+                           " cases (exit status ", kCannotHide, " for each)"));
+        continue;
+      }
       TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
                                   comparison_->Run<v1::DiagnoseResponse>(
                                       [&](grpc::ClientContext* context) {
@@ -239,12 +184,64 @@ class Rehearsal {
   }
 
   std::vector<RehearsalRow> Rows() const { return Summarise(cases_, state_.sets()); }
+  // Cases that the generator does not hide.
+  std::vector<std::string> LeftOut() const {
+    std::vector<std::string> names;
+    for (const RehearsedCase& one : cases_)
+      if (std::any_of(state_.sets().begin(), state_.sets().end(),
+                      [&](const RehearsedSet& set) { return set.left_out && set.name == one.name; }))
+        names.push_back(one.name);
+    return names;
+  }
 
  private:
+  absl::Status ReadPlans() {
+    const auto read = [this](const v1::Evidence& evidence) -> absl::Status {
+      if (evidence.csv().empty())
+        return absl::InvalidArgumentError("PLAN: a measurement file or plan (CSV) of touches was expected");
+      TOUCHSTONE_ASSIGN_OR_RETURN(plans_.emplace_back(),
+                                  client::ParseMeasurements(evidence.csv(), evidence.origin()));
+      if (plans_.back().empty())
+        return absl::InvalidArgumentError(absl::StrCat("PLAN: ", evidence.origin(), " has no touch"));
+      return absl::OkStatus();
+    };
+    TOUCHSTONE_RETURN_IF_ERROR(read(comparison_->evidence()));
+    for (const v1::Evidence& further : comparison_->further()) TOUCHSTONE_RETURN_IF_ERROR(read(further));
+    return absl::OkStatus();
+  }
+
+  // The sessions of set n; false: the case cannot be hidden.
+  absl::StatusOr<bool> Touch(const RehearsedCase& hidden, size_t n, v1::DiagnoseRequest* request) {
+    *request->mutable_evidence() = comparison_->evidence();
+    request->mutable_evidence()->set_seed(options_.seed + n);
+    *request->mutable_further() = {comparison_->further().begin(), comparison_->further().end()};
+    const int sessions = static_cast<int>(plans_.size());
+    for (int session = 0; session < sessions; ++session) {
+      // Sets of one session have the seeds that they always had.
+      const uint64_t seed = options_.seed + 1 + n + (static_cast<uint64_t>(session) << 32);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<std::string> csv,
+                                  files_->Make({&plans_[session], &hidden, session, sessions, seed}));
+      if (!csv) return false;
+      v1::Evidence* evidence =
+          session == 0 ? request->mutable_evidence() : request->mutable_further(session - 1);
+      const bool mistaken = hidden.is_mistake && session == sessions - 1;
+      evidence->set_csv(mistaken ? WithFingersExchanged(*csv) : *csv);
+    }
+    return true;
+  }
+
+  // A round of all cases, and no set.
+  bool NothingIsMade() const {
+    const std::vector<RehearsedSet>& sets = state_.sets();
+    return sets.size() >= cases_.size() &&
+           std::all_of(sets.begin(), sets.end(), [](const RehearsedSet& set) { return set.left_out; });
+  }
+
   const Cli& cli_;
   const RehearseOptions& options_;
   Comparison* comparison_;
-  std::vector<client::MeasuredTouch> plan_;
+  std::vector<std::vector<client::MeasuredTouch>> plans_;  // one per session
+  std::unique_ptr<RehearsedFiles> files_;
   std::vector<RehearsedCase> cases_;
   RehearsalState state_;
 };
@@ -253,9 +250,12 @@ absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
   if (!(options.minutes > 0))
     return absl::InvalidArgumentError(
         absl::StrCat("--minutes: ", options.minutes, "; a positive number was expected"));
+  if (!(options.generator.limit_s > 0) || !std::isfinite(options.generator.limit_s))
+    return absl::InvalidArgumentError(
+        absl::StrCat("--generator-limit-s: ", options.generator.limit_s, "; a positive number was expected"));
+  if (options.generator.program.empty() && options.generator.limit_s != kGeneratorLimitS)
+    return absl::InvalidArgumentError("--generator-limit-s: of what generator? Give --generator PROGRAM");
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
-  if (comparison->evidence().csv().empty())
-    return absl::InvalidArgumentError("PLAN: a measurement file or plan (CSV) of touches was expected");
   Rehearsal rehearsal(cli, options, comparison.get());
   TOUCHSTONE_RETURN_IF_ERROR(rehearsal.Prepare());
   const absl::Status run = rehearsal.Run();
@@ -264,7 +264,8 @@ absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
   const std::vector<RehearsalRow> rows = rehearsal.Rows();
   if (!options.json.empty())
     TOUCHSTONE_RETURN_IF_ERROR(cli.Write(options.json, SummaryJson(rows).dump(2) + "\n"));
-  if (!options.ReportOnStdout()) TOUCHSTONE_RETURN_IF_ERROR(cli.Print(SummaryText(rows)));
+  if (!options.ReportOnStdout())
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Print(SummaryText(rows, options.generator.program, rehearsal.LeftOut())));
   return run;
 }
 
@@ -273,7 +274,8 @@ absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
 void AddRehearse(Cli* cli) {
   auto options = std::make_shared<RehearseOptions>();
   options->set_name = "PLAN";
-  options->set_text = kPlanText;
+  options->max_sets = kMaxSessions;
+  options->set_text = absl::StrCat(kPlanText, ". Several: sessions of one rig, diagnosed together");
   CLI::App* command = cli->AddCommand(
       nullptr, "rehearse",
       "Hides effects, pairs, a cause of no catalogue, a mistake and nothing in simulated sets of your own "
@@ -284,9 +286,25 @@ void AddRehearse(Cli* cli) {
       "it was stopped\n"
       "touchstone rehearse plan.csv --model rig.yaml --effects tip_radius,oblique_slip --size 0.1\n"
       "touchstone rehearse plan.csv --model rig.yaml --size found      at the sizes that `touchstone check` "
-      "gives",
+      "gives\n"
+      "touchstone rehearse monday.csv friday.csv --model rig.yaml      is a change between them found?\n"
+      "touchstone rehearse plan.csv --model rig.yaml --generator ./my_rig.py      the sets are your "
+      "program's",
       [cli, options] { return RunRehearse(*cli, *options); });
   AddComparisonOptions(cli, command, options.get(), /*html=*/false);
+  cli->AddInput(
+      command,
+      command
+          ->add_option(
+              "--generator", options->generator.program,
+              "A program that makes the sets, a path or a name in PATH: run once per session with "
+              "--plan, --model, --output, --seed, --session, --sessions, --mesh and a --hide per effect "
+              "(server/README.md). Default: this product's simulator")
+          ->type_name("PROGRAM"));
+  command
+      ->add_option("--generator-limit-s", options->generator.limit_s,
+                   "What the program may take for one file. Default: 60")
+      ->type_name("SECONDS");
   command->add_option("--minutes", options->minutes, "Ends after so long. Default: 10")->type_name("MINUTES");
   command
       ->add_option("--sets", options->sets,

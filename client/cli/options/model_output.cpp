@@ -1,8 +1,10 @@
 #include "client/cli/options/model_output.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "server/base/status.h"
+#include "server/effects/all_effects.h"
 #include "server/model/surface_map_file.h"
 
 namespace touchstone::cli {
@@ -30,6 +32,21 @@ absl::Status WriteModel(const Cli& cli, const std::string& option, const std::st
     instance.effect = std::move(effect);
   }
   return cli.Write(path, model::FormatModel(written, model::FileContent::kBeside) + from);
+}
+
+absl::StatusOr<model::Model> WriteModelText(const Cli& cli, const std::string& option,
+                                            const std::string& path, const std::string& yaml) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(model::Model model, model::ParseModel(yaml, option, effects::Catalogue()));
+  const bool with_map =
+      std::any_of(model.effects.begin(), model.effects.end(),
+                  [](const model::EffectInstance& one) { return one.effect->surface_map != nullptr; });
+  if (!with_map) {
+    TOUCHSTONE_RETURN_IF_ERROR(cli.Write(path, yaml));
+    return model;
+  }
+  TOUCHSTONE_ASSIGN_OR_RETURN(const model::Provenance provenance, model::ReadProvenance(yaml, option));
+  TOUCHSTONE_RETURN_IF_ERROR(WriteModel(cli, option, path, model, provenance));
+  return model;
 }
 
 }  // namespace touchstone::cli

@@ -17,4 +17,8 @@ std::string SurfaceMapPath(const std::string& model_path);
 absl::Status WriteModel(const Cli& cli, const std::string& option, const std::string& path,
                         const model::Model& model, const model::Provenance& provenance = {});
 
+// The same with a model that a report holds as text: where it has no surface map, byte for byte. Returns the model.
+absl::StatusOr<model::Model> WriteModelText(const Cli& cli, const std::string& option,
+                                            const std::string& path, const std::string& yaml);
+
 }  // namespace touchstone::cli

@@ -1,6 +1,7 @@
 #include "client/cli/options/report_posterior.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <google/protobuf/util/json_util.h>
 
 #include <nlohmann/json.hpp>
@@ -25,17 +26,31 @@ std::string WhyNone(const ReportJson& report) {
   if (verdict == "TOO_LITTLE_DATA") return "the set has too few measurements for a verdict (TOO_LITTLE_DATA)";
   if (data.size() == 2 && kind(0) != kind(1))
     return "it is one of touches and photographs together, whose values have no joint uncertainty yet: "
-           "diagnose the touches alone";
+           "diagnose touches.csv by itself";
   if (data.size() == 1 && kind(0) == "PHOTOGRAPHS")
-    return "it is one of photographs, and only a model of touches has one";
+    return "it is one of photographs, whose own budget stands in the report; of other pictures nothing is "
+           "predicted "
+           "yet: give a report on touches";
   if (data.size() == 1 && kind(0) == "BOARDS")
-    return "it is one of chessboards, and only a model of touches has one";
+    return "it is one of chessboards, whose own budget stands in the report; of other pictures nothing is "
+           "predicted "
+           "yet: give a report on touches";
   if (data.size() == 1 && kind(0) == "DISTRIBUTIONS")
     return "its touches have no poses, so that no value of a model was fitted";
   if (verdict == "VERDICT_UNSPECIFIED") return "it has no verdict, as of `touchstone compare`";
   if (data.size() > 1)
     return "the last of its sessions does not agree with what all of them say, or takes no part in it";
   return "it was written by a version that did not keep it: diagnose the set again";
+}
+
+// In the report's budget of all objects, us; 0: none was found.
+double MisfitOf(const ReportJson& report) {
+  const ReportJson budgets = report.value("uncertainty", ReportJson::array());
+  if (!budgets.is_array() || budgets.empty() || !budgets.back().is_object()) return 0;
+  for (const ReportJson& one : budgets.back().value("contributions", ReportJson::array()))
+    if (one.is_object() && one.value("name", "") == "misfit" && one["std_uncertainty"].is_number())
+      return one["std_uncertainty"];
+  return 0;
 }
 
 }  // namespace
@@ -61,6 +76,10 @@ absl::StatusOr<ReportedPosterior> PosteriorOfReport(const std::string& path) {
     found.note = absl::StrCat("note: ", path,
                               " says UNEXPLAINED: something is left that the model does not have, and its "
                               "predictions err by more than these uncertainties say");
+  if (const double misfit_us = MisfitOf(report); misfit_us > 0)
+    absl::StrAppend(&found.note, found.note.empty() ? "" : "\n", "note: the model of ", path,
+                    " leaves a misfit of ", absl::StrFormat("%.3g ms", misfit_us / 1000),
+                    " on the set that it was fitted to, which these uncertainties do not hold");
   return found;
 }
 

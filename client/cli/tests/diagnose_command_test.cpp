@@ -106,8 +106,10 @@ TEST_F(DiagnoseCommandTest, FindsWhatIsMissingAndSavesTheModelThatHasIt) {
       Command("diagnose", {"--json", "report.json", "--html", "report.html", "--save-model", "better.yaml"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("tip_radius"));
-  EXPECT_THAT(outcome.err, HasSubstr("wrote better.yaml (better, hash "));
+  EXPECT_THAT(outcome.err, HasSubstr("wrote better.yaml (nominal_better, hash "));
   const Json report = Json::parse(Read("report.json"));
+  // The page, Python and this command write the bytes of the report.
+  EXPECT_EQ(Read("better.yaml"), report["improved_model_yaml"]);
   EXPECT_EQ(report["verdict"], "MISSING_EFFECTS");
   ASSERT_GE(report["steps"].size(), 1u);
   EXPECT_EQ(report["steps"][0]["effect"], "tip_radius");

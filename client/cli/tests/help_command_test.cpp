@@ -32,13 +32,15 @@ class HelpCommandTest : public RealBinaryTest {
   }
 
   // Standard output where that is a terminal of so many columns.
-  std::string AtTerminal(unsigned short columns, const std::vector<std::string>& words) {
+  std::string AtTerminal(unsigned short columns, const std::vector<std::string>& words,
+                         const std::string& name = "touchstone") {
     winsize size{};
     size.ws_row = 24, size.ws_col = columns;
     int terminal = -1;
     const pid_t child = ::forkpty(&terminal, nullptr, nullptr, &size);
     if (child == 0) {
-      std::string program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "touchstone";
+      std::string program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+      ::unsetenv("COLUMNS");
       std::vector<char*> raw = {program.data()};
       for (const std::string& word : words) raw.push_back(const_cast<char*>(word.c_str()));
       raw.push_back(nullptr);
@@ -55,9 +57,11 @@ class HelpCommandTest : public RealBinaryTest {
     EXPECT_EQ(status, 0);
     return text;
   }
-  size_t Longest(unsigned short columns, const std::vector<std::string>& words) {
+  size_t Longest(unsigned short columns, const std::vector<std::string>& words,
+                 const std::string& name = "touchstone") {
     size_t length = 0;
-    for (const absl::string_view line : absl::StrSplit(AtTerminal(columns, words), absl::ByAnyChar("\r\n")))
+    for (const absl::string_view line :
+         absl::StrSplit(AtTerminal(columns, words, name), absl::ByAnyChar("\r\n")))
       length = std::max(length, line.size());
     return length;
   }
@@ -118,11 +122,39 @@ TEST_F(HelpCommandTest, AManualPageSaysWhatHelpSays) {
 TEST_F(HelpCommandTest, TextIsAsWideAsTheTerminal) {
   for (const unsigned short columns : {60, 80, 120})
     for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"help"}, {"help", "model", "add"}, {"help", "capture"}, {"doctor"}})
+             {"help"}, {"help", "model", "add"}, {"help", "capture"}, {"doctor"}, {"effects"}})
       EXPECT_LE(Longest(columns, words), columns) << words.back();
-  // Names of parameters are not broken: at 60 columns this table is wider.
-  for (const unsigned short columns : {80, 120}) EXPECT_LE(Longest(columns, {"effects"}), columns);
   EXPECT_GT(Longest(120, {"effects"}), 100u);
+}
+
+// Without room for four columns the last one stands below.
+TEST_F(HelpCommandTest, WhatEffectsMeanStandsBelowTheirNamesOnANarrowTerminal) {
+  const std::string narrow = absl::StrReplaceAll(AtTerminal(60, {"effects"}), {{"\r", ""}});
+  EXPECT_THAT(narrow,
+              testing::ContainsRegex("\ntip_radius +contact +radius_mm\n    The finger tips are spheres"));
+  EXPECT_THAT(AtTerminal(120, {"effects"}),
+              testing::ContainsRegex("tip_radius +contact +radius_mm +The finger tips"));
+}
+
+TEST_F(HelpCommandTest, TheHelpOfEveryProgramIsAsWideAsTheTerminal) {
+  for (const char* program :
+       {"touchstone-server", "touchstone-gateway", "touchstone-probe", "touchstone-rig-emulator"})
+    for (const unsigned short columns : {60, 80, 120})
+      EXPECT_LE(Longest(columns, {"--help"}, program), columns) << program;
+}
+
+TEST_F(HelpCommandTest, ColumnsIsTheWidthWhereThereIsNoTerminal) {
+  ASSERT_EQ(::setenv("COLUMNS", "64", 1), 0);
+  const std::string help = Run({"help", "diagnose"}).out;
+  ::unsetenv("COLUMNS");
+  size_t longest = 0;
+  bool example = false;  // shown as it can be copied
+  for (const absl::string_view line : absl::StrSplit(help, '\n')) {
+    example = line == "Examples:" || (example && !line.empty());
+    if (!example) longest = std::max(longest, line.size());
+  }
+  EXPECT_LE(longest, 64u);
+  EXPECT_GT(longest, 50u);
 }
 
 TEST_F(HelpCommandTest, TheHelpOfEveryCommandIsAsWideAsTheTerminal) {

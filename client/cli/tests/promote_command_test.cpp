@@ -1,7 +1,12 @@
 // model promote and demote as people meet them: the real binary.
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
+#include <absl/strings/str_split.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "client/cli/tests/real_binary_test.h"
 
@@ -65,12 +70,61 @@ TEST_F(PromoteCommandTest, UnseenDataPromoteAndOneCommandUndoesIt) {
   EXPECT_EQ(Run({"compare", "friday.csv", "--model", "rig2.yaml"}).exit_code, 0);
 }
 
+TEST_F(PromoteCommandTest, TheFileBeforeComesBackByteForByteWhateverHappenedToTheOther) {
+  const std::string before = "# bench 2, since May\n\n" + Read("rig.yaml") + "# end";
+  Write("rig.yaml", before);
+  ASSERT_EQ(Promote("better.yaml", "friday.csv").exit_code, 0);
+  ASSERT_EQ(Run({"model", "demote", "rig2.yaml", "-o", "back.yaml"}).exit_code, 0);
+  EXPECT_EQ(Read("back.yaml"), before);
+
+  // Changed by hand: said, and restored all the same; so is one that is read only, by a link.
+  const std::string promoted = Read("rig2.yaml");
+  const size_t spacing = promoted.find("spacing_mm: 30");
+  Write("rig2.yaml", std::string(promoted).replace(spacing, 14, "spacing_mm: 31"));
+  std::filesystem::permissions(Path("rig2.yaml"), std::filesystem::perms::owner_read);
+  std::filesystem::create_symlink("rig2.yaml", Path("link.yaml"));
+  const Outcome changed = Run({"model", "demote", "link.yaml", "-o", "back2.yaml"});
+  ASSERT_EQ(changed.exit_code, 0) << changed.err;
+  EXPECT_THAT(changed.err, HasSubstr("note: link.yaml was changed since it was promoted (hash "));
+  EXPECT_EQ(Read("back2.yaml"), before);
+
+  // What is to be restored was changed: that is no longer the file before.
+  Write("rig3.yaml", absl::StrReplaceAll(promoted, {{"spacing_mm: 30", "spacing_mm: 31"}}));
+  EXPECT_THAT(Run({"model", "demote", "rig3.yaml", "-o", "back3.yaml"}).err,
+              HasSubstr("rig3.yaml: provenance.promoted.before was changed"));
+
+  // Into what a link leads to; the link stays.
+  Write("rig.yaml", "other");
+  std::filesystem::create_symlink("rig.yaml", Path("current.yaml"));
+  EXPECT_THAT(Run({"model", "demote", "rig2.yaml", "-o", "current.yaml"}).err,
+              HasSubstr("--force to replace it"));
+  ASSERT_EQ(Run({"model", "demote", "rig2.yaml", "-o", "current.yaml", "--force"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(Path("current.yaml")));
+  EXPECT_EQ(Read("rig.yaml"), before);
+}
+
 TEST_F(PromoteCommandTest, DataThatItWasFittedToDoNotPromote) {
   const Outcome outcome = Promote("better.yaml", "monday.csv");
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("monday.csv is what better.yaml was fitted to"));
-  Write("copy.csv", Read("monday.csv"));
-  EXPECT_EQ(Promote("better.yaml", "copy.csv").exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("monday.csv holds what better.yaml was fitted to"));
+}
+
+TEST_F(PromoteCommandTest, ACopyInAnotherFormIsNoUnseenData) {
+  const std::string monday = Read("monday.csv");
+  Write("crlf.csv", absl::StrReplaceAll(monday, {{"\n", "\r\n"}}));
+  std::string reversed;
+  for (const absl::string_view line : absl::StrSplit(monday, '\n', absl::SkipEmpty())) {
+    std::vector<std::string> fields = absl::StrSplit(line, ',');
+    std::reverse(fields.begin(), fields.end());
+    absl::StrAppend(&reversed, absl::StrJoin(fields, ","), "\n");
+  }
+  Write("columns.csv", reversed);
+  for (const char* copy : {"crlf.csv", "columns.csv"}) {
+    const Outcome outcome = Promote("better.yaml", copy);
+    EXPECT_EQ(outcome.exit_code, 2) << copy;
+    EXPECT_THAT(outcome.err,
+                HasSubstr(absl::StrCat("--on: ", copy, " holds what better.yaml was fitted to (monday.csv")));
+  }
 }
 
 TEST_F(PromoteCommandTest, AModelThatErrsMoreOrNoLessIsRefusedWithTheInterval) {

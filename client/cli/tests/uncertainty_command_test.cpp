@@ -1,5 +1,6 @@
 // How sure a model's predictions are, and models that are drawn, as people and scripts meet them: the real
 // binary.
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,6 +62,15 @@ TEST_F(UncertaintyCommandTest, ABudgetNamesWhatAPredictionIsUnsureBy) {
                      std::pow(all["repeatability"].get<double>(), 2);
   EXPECT_NEAR(all["combined"].get<double>(), std::sqrt(sum), 1e-6 * std::sqrt(sum));
   EXPECT_EQ(all["contributions"][0]["name"], "repeatability");
+  // A line of the terminal per contribution, here and in the diagnosis; largest first.
+  for (const std::string& text : {outcome.out, Run({"diagnose", "set.csv", "--model", "nominal.yaml"}).out}) {
+    size_t at = text.find("Budget ");
+    ASSERT_NE(at, std::string::npos) << text;
+    for (const Json& contribution : all["contributions"]) {
+      at = text.find(absl::StrCat("\n            ", contribution["name"].get<std::string>(), " "), at);
+      EXPECT_NE(at, std::string::npos) << contribution << text;
+    }
+  }
   EXPECT_FALSE(all.contains("reproducibility"));
   // The same touches: what the diagnosis itself says of them.
   EXPECT_EQ(Json::parse(Read("report.json"))["uncertainty"].back()["touches"], all["touches"]);

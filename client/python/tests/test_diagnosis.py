@@ -79,7 +79,11 @@ def test_it_says_what_the_command_line_says(server, server_program, measured, re
         pytest.skip(f"{program} is not built")
     (tmp_path / "nominal.yaml").write_text(NOMINAL)
     subprocess.run([str(program), "diagnose", str(measured), "--model", str(tmp_path / "nominal.yaml"), "--server",
-                    server.target, "--json", str(tmp_path / "report.json"), "--quiet"], check=True, timeout=300)
+                    server.target, "--json", str(tmp_path / "report.json"), "--save-model", str(tmp_path / "better.yaml"),
+                    "--quiet"], check=True, timeout=300)
+    report.save_model(tmp_path / "ours.yaml")
+    assert (tmp_path / "ours.yaml").read_bytes() == (tmp_path / "better.yaml").read_bytes()
+    assert f'fitted_to:\n    - {{set: "{measured}", sha256: ' in (tmp_path / "ours.yaml").read_text()
     theirs, ours = json.loads((tmp_path / "report.json").read_text()), report.to_dict()
     for name in ("verdict", "summary", "warnings", "improved_model_yaml", "improved_model_hash"):
         assert ours[name] == theirs[name]

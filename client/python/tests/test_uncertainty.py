@@ -28,10 +28,10 @@ def report(client, measured):
 def test_a_report_has_a_budget_of_its_own_touches(report):
     lat20, everything = report.uncertainty
     assert (lat20.object, everything.object) == ("lat20", "")
-    assert lat20.combined_us == pytest.approx(np.sqrt(lat20.parameters_us**2 + lat20.surface_us**2 + lat20.repeatability_us**2))
-    assert lat20.source == "repeatability" and lat20.share == pytest.approx((lat20.repeatability_us / lat20.combined_us)**2)
-    assert lat20.reproducibility_us is None and lat20.beyond_measured == 0
-    assert next(iter(lat20.contributions_us)) == "repeatability"
+    assert lat20.combined == pytest.approx(np.sqrt(lat20.parameters**2 + lat20.surface**2 + lat20.repeatability**2))
+    assert lat20.source == "repeatability" and lat20.share == pytest.approx((lat20.repeatability / lat20.combined)**2)
+    assert lat20.reproducibility is None and lat20.beyond_measured == 0
+    assert next(iter(lat20.contributions)) == "repeatability"
 
 
 def test_a_plan_gets_a_budget_and_a_figure(client, report, measured, tmp_path):
@@ -48,7 +48,7 @@ def test_a_plan_gets_a_budget_and_a_figure(client, report, measured, tmp_path):
 def test_a_budget_is_a_table(report):
     pytest.importorskip("pandas")
     frame = report.uncertainty.to_pandas()
-    assert list(frame["object"]) == ["lat20", ""] and frame["combined_us"].min() > 0
+    assert list(frame["object"]) == ["lat20", ""] and frame["combined"].min() > 0
 
 
 def test_a_dataset_has_uncertainties_and_models_of_its_own(client, report):

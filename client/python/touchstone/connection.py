@@ -156,7 +156,7 @@ class Connection:
                 if errors.is_too_fast(error):
                     time.sleep(random.uniform(0.01, 0.05))
                     continue
-                failure = errors.from_rpc(error, self.target)
+                failure = errors.from_rpc(error, self.target, request)
                 # A target that says nothing in time is left for the next one; each gets its time once.
                 late = error.code() == grpc.StatusCode.DEADLINE_EXCEEDED
                 silent += late

@@ -207,7 +207,7 @@ class Dataset:
 
     def _lost(self, error: grpc.RpcError, retry: Retry) -> None:
         """Returns when the stream may be opened again; otherwise raises the error for the user."""
-        failure = errors.from_rpc(error, self._connection.target)
+        failure = errors.from_rpc(error, self._connection.target, self.spec)
         if not errors.is_lost(error):
             raise failure from None
         self._connection.move_on()

@@ -163,7 +163,7 @@ class Diagnosis:
                         on_progress(response.progress.stage, response.progress.done)
                 raise errors.SourceFailed("The source ended without a report.", target=self._connection.target)
             except grpc.RpcError as error:
-                failure = errors.from_rpc(error, self._connection.target)
+                failure = errors.from_rpc(error, self._connection.target, request)
                 if not errors.is_lost(error):
                     raise failure from None
             finally:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import grpc
 
 from .channel import proxy_for
 from .printable import printable
+from .sent_files import name_files
 
 
 class TouchstoneError(Exception):
@@ -75,10 +78,11 @@ _NOT_OFFERED = ("this source does not offer that; only a rig has an arm: a recor
                 "none")
 
 
-def from_rpc(error: grpc.RpcError, target: str) -> TouchstoneError:
-    """The exception for a failed call; raise it `from None`."""
+def from_rpc(error: grpc.RpcError, target: str, request: Any = None) -> TouchstoneError:
+    """The exception for a failed call; raise it `from None`. With the request, files that it holds are named by their paths."""
     code = error.code().name
     details = error.details() or (_NOT_OFFERED if code == "UNIMPLEMENTED" else "no message")
+    details = name_files(details, request)
     kind = _CLASSES.get(code, SourceFailed)
     if kind is SourceUnreachable:
         proxy = proxy_for(target)

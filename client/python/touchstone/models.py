@@ -10,6 +10,7 @@ from typing import Union
 
 from . import images, units
 from .errors import InvalidRequest
+from .sent_files import remember
 from .v1 import models_pb2, source_pb2, types_pb2
 
 _SOURCE_KINDS: dict[int, str] = {source_pb2.SOURCE_KIND_VIRTUAL: "virtual", source_pb2.SOURCE_KIND_PHYSICAL: "physical"}
@@ -254,8 +255,10 @@ def read_model_file(path: str | os.PathLike[str]) -> str:
     """The text of a model file, with the surface map in it that it names. InvalidRequest where it cannot be read."""
     try:
         text = pathlib.Path(path).read_text(encoding="utf-8")
-        return re.sub(_SURFACE_MAP, lambda found: _with_content(found, pathlib.Path(path).parent), text)
+        text = re.sub(_SURFACE_MAP, lambda found: _with_content(found, pathlib.Path(path).parent), text)
     except OSError as error:
         raise InvalidRequest(f"Model file {os.fspath(path)}: {error.strerror}.") from None
     except UnicodeDecodeError:
         raise InvalidRequest(f"Model file {os.fspath(path)} is not UTF-8 text.") from None
+    remember(text, os.fspath(path))
+    return text

@@ -134,9 +134,10 @@ class Report(Tabular):
 
     @property
     def uncertainty(self) -> Rows[UncertaintyBudget]:
-        """How well the model that the report ends with predicts touches like these, an entry per object and one of all (object
-        ""): of diagnose() on touches, and of uncertainty()."""
-        return Rows(map(_budget, self.message.uncertainty))
+        """How well the model that the report ends with predicts measurements like these, an entry per object and one of all
+        (object ""): of diagnose(), but for touches and photographs together, and of uncertainty()."""
+        unit = self.message.data[0].unit if self.message.data else ""
+        return Rows(_budget(budget, unit) for budget in self.message.uncertainty)
 
     @property
     def explained(self) -> Explanation | None:
@@ -254,9 +255,9 @@ def _detectable(d: diagnosis_pb2.DetectableEffect) -> Detectable:
     )
 
 
-def _budget(b: diagnosis_pb2.UncertaintyBudget) -> UncertaintyBudget:
+def _budget(b: diagnosis_pb2.UncertaintyBudget, unit: str) -> UncertaintyBudget:
     return UncertaintyBudget(
-        b.object, b.touches, b.parameters, b.surface, b.repeatability, b.reproducibility if b.HasField("reproducibility") else None,
+        unit, b.object, b.touches, b.parameters, b.surface, b.repeatability, b.reproducibility if b.HasField("reproducibility") else None,
         b.combined, b.largest, b.beyond_measured, b.contributions[0].name if b.contributions else "",
         b.contributions[0].share if b.contributions else 0.0, b,
     )

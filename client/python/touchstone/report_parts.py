@@ -134,55 +134,59 @@ class Detectable:
 
 @dataclasses.dataclass(frozen=True)
 class UncertaintyBudget:
-    """Standard uncertainties, us, of a finger's next contact time as a model predicts it, less the mean over its touch: root
-    mean squares over touches. report.uncertainty has to_pandas(), to_arrow() and plot().
+    """Standard uncertainties of a finger's next contact time as a model predicts it, less the mean over its touch, or of a pixel
+    of a photograph, or of a corner of a board: root mean squares over touches or pictures. report.uncertainty has to_pandas(), to_arrow() and plot().
 
     Attributes:
+      unit: "us", "grey" or "px".
       object: "": of all.
-      touches: how many meet the object with two fingers or more; repeats of a pose count once.
-      parameters_us, surface_us, repeatability_us: of the model's values, of the surface's departure from its mesh, of the
+      touches: how many meet the object with two fingers or more, repeats of a pose count once; or pictures.
+      parameters, surface, repeatability: of the model's values, of the surface's departure from its mesh, of the
         noise of one reading.
-      reproducibility_us: of values that differ from session to session; None: not estimated, the model is of one session.
-      combined_us, largest_us: all of them; and that of the worst finger of the worst touch.
+      reproducibility: of values that differ from session to session; None: not estimated, the model is of one session.
+      combined, largest: all of them; and that of the worst finger of the worst touch.
       beyond_measured: touches that meet the object where nothing was measured near.
       source, share: what contributes most ("repeatability", an effect), and its share of the combined variance.
       message: all of it, touchstone.v1.UncertaintyBudget.
     """
 
+    unit: str
     object: str
     touches: int
-    parameters_us: float
-    surface_us: float
-    repeatability_us: float
-    reproducibility_us: float | None
-    combined_us: float
-    largest_us: float
+    parameters: float
+    surface: float
+    repeatability: float
+    reproducibility: float | None
+    combined: float
+    largest: float
     beyond_measured: int
     source: str
     share: float
     message: diagnosis_pb2.UncertaintyBudget = dataclasses.field(repr=False, compare=False)
 
     @property
-    def contributions_us(self) -> dict[str, float]:
-        """The effects alone and the rest by name, largest first. Correlations between effects are in parameters_us only."""
+    def contributions(self) -> dict[str, float]:
+        """The effects alone and the rest by name, largest first. Correlations between effects are in parameters only."""
         return {one.name: one.std_uncertainty for one in self.message.contributions}
 
     @staticmethod
     def _draw_all(rows: Sequence[UncertaintyBudget], axes: Any) -> None:
         """Variances stacked: they add, standard uncertainties do not."""
         names = [row.object or "all" for row in rows]
-        parts = {"parameters": [row.parameters_us for row in rows], "surface": [row.surface_us for row in rows],
-                 "repeatability": [row.repeatability_us for row in rows],
-                 "reproducibility": [row.reproducibility_us or 0.0 for row in rows]}
+        parts = {"parameters": [row.parameters for row in rows], "surface": [row.surface for row in rows],
+                 "repeatability": [row.repeatability for row in rows],
+                 "reproducibility": [row.reproducibility or 0.0 for row in rows],
+                 "misfit": [row.contributions.get("misfit", 0.0) for row in rows]}
+        unit, scale = ("ms", 1000.0) if rows[0].unit == "us" else (rows[0].unit, 1.0)
         left = [0.0] * len(names)
         for name, values in parts.items():
             if not any(values):
                 continue
-            squares = [(value / 1000)**2 for value in values]
+            squares = [(value / scale)**2 for value in values]
             tabular.bars(axes, names, squares, left=left, label=name)
             left = [begin + square for begin, square in zip(left, squares)]
         axes.set_ylim(len(names) - 0.5, -0.5)
-        axes.set(xlabel="variance of a predicted contact time, ms^2")
+        axes.set(xlabel=f"variance of a prediction, {unit}^2")
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncol=len(parts), frameon=False)
 
 

@@ -69,6 +69,15 @@ test("a click on a slice filters touches, object and plot, and the address says 
   }, { name: "slice" });
 });
 
+test("the improved model is saved as the report holds it", async () => {
+  await opened(touches, async (page) => {
+    await page.locator("details.model summary").click();
+    const saved = page.waitForEvent("download");
+    await page.getByRole("button", { name: "Save the improved model" }).click();
+    assert.equal(readFileSync(await (await saved).path(), "utf8"), touches.report.improved_model_yaml);
+  }, { name: "saved model" });
+});
+
 test("an address brings back what was selected", async () => {
   const touch = touches.report.data[0].worst_touches[0].touch;
   await opened(touches, async (page) => {

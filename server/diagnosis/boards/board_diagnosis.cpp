@@ -13,6 +13,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/diagnosis/boards/board_search.h"
+#include "server/diagnosis/engine/fitted_values.h"
 #include "server/diagnosis/engine/ladder.h"
 #include "server/diagnosis/engine/resampled_covariance.h"
 #include "server/effects/all_effects.h"
@@ -147,11 +148,30 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
   return words;
 }
 
+// Two readings a corner, as errors are counted.
+void AddBudget(const BoardSet& set, const LensFit& lens, const Eigen::MatrixXd& covariance,
+               BoardDiagnosis* diagnosis) {
+  const int values = lens.fit.model.size(), corners = set.board.corners();
+  std::vector<int> all(values);
+  std::iota(all.begin(), all.end(), 0);
+  const double noise = std::sqrt(2.0) * diagnosis->noise.sigma;
+  uncertainty::PictureBudgetSum sum(engine::FittedValuesOf(lens.fit.model, all, covariance), noise);
+  for (int picture = 0; picture < diagnosis->pictures; ++picture) {
+    const auto derivatives = lens.fit.columns.values.block(static_cast<Eigen::Index>(picture) * 2 * corners,
+                                                           1, 2 * corners, values);
+    sum.Add("", derivatives.transpose() * derivatives / corners);
+  }
+  diagnosis->uncertainty = sum.Budgets();
+  uncertainty::AddMisfit({diagnosis->final->rmse, noise, diagnosis->final->lack_of_fit_p}, 1,
+                         &diagnosis->uncertainty);
+}
+
 absl::Status AddSteps(const BoardSet& set, const BoardSearch& search, const std::vector<LensFit>& ladder,
                       const LensFit& fullest, uint64_t seed, BoardDiagnosis* diagnosis) {
   const LensFit& last = ladder.back();
   const Eigen::MatrixXd covariance = engine::ResampledCovariance(search.experiment(), last.fit, seed);
   // Few pictures know little of their own scatter.
+  AddBudget(set, last, covariance, diagnosis);
   const double t = StudentQuantile(0.975, static_cast<double>(set.pictures.size()) - 1);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::SelectedStep> selected, search.Compete(last));
   for (const engine::SelectedStep& from : selected) {

@@ -18,6 +18,7 @@
 #include "server/diagnosis/engine/parameter_estimate.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
+#include "server/uncertainty/budget.h"
 
 namespace touchstone::diagnosis::boards {
 
@@ -62,6 +63,8 @@ struct BoardDiagnosis {
   std::vector<std::string> copies;  // files whose corners are another's to the last digits: counted once
   std::optional<BoardLens> lens;    // none with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
+  // Of a corner that the lens predicts, the picture's pose fitted to its corners; of all pictures, px. None with kTooLittleData.
+  std::vector<uncertainty::Budget> uncertainty;
   std::string summary;
   std::vector<std::string> warnings;
   double duration_s = 0;

@@ -86,6 +86,15 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
   }
   EXPECT_LT(std::abs(Find(diagnosis, "k1")->value + 0.28), 0.02);
   for (const engine::LadderStep& step : diagnosis.steps) EXPECT_GT(step.probability, 0.99) << step.effect;
+  // What a corner is predicted with: as many values as there are readings of them leave almost nothing open.
+  ASSERT_EQ(diagnosis.uncertainty.size(), 1u);
+  const uncertainty::Budget& budget = diagnosis.uncertainty[0];
+  EXPECT_EQ(budget.touches, 14);
+  EXPECT_NEAR(budget.repeatability, std::sqrt(2.0) * diagnosis.noise.sigma, 1e-12);
+  EXPECT_GT(budget.parameters, 0);
+  EXPECT_LT(budget.parameters, 0.1 * budget.repeatability);
+  ASSERT_EQ(budget.contributions.size(), 4u);
+  EXPECT_EQ(budget.contributions[0].name, "repeatability");
   // Through the improved model nothing is missing any more.
   ASSERT_TRUE(diagnosis.improved_model);
   EXPECT_EQ(Diagnosed(set, *diagnosis.improved_model).verdict, Verdict::kAdequate);

@@ -4,6 +4,8 @@
 #include <absl/strings/str_split.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <set>
 #include <string>
@@ -53,6 +55,27 @@ TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput({}));
   EXPECT_EQ(d.verdict, engine::Verdict::kAdequate);
   EXPECT_TRUE(d.steps.empty());
+}
+
+TEST(DiagnosePhotographs, SaysWhatAPixelIsPredictedWith) {
+  HiddenCamera rig;
+  rig.hidden = {{"exposure", {"stops=0.4"}}};
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  ASSERT_EQ(d.steps.size(), 1u) << d.summary;
+  ASSERT_EQ(d.uncertainty.size(), d.objects.size() + 1);
+  const uncertainty::Budget& all = d.uncertainty.back();
+  EXPECT_EQ(all.object, "");
+  EXPECT_GT(all.touches, 0);
+  EXPECT_EQ(all.repeatability, d.noise_floor.sigma);
+  // Light times 2^stops: a pixel's grey level changes by ln 2 times itself with a stop; the ground has a level of its own.
+  const auto exposure = std::find_if(all.contributions.begin(), all.contributions.end(),
+                                     [](const auto& one) { return one.name == "exposure"; });
+  ASSERT_NE(exposure, all.contributions.end());
+  const double error_stops = d.steps[0].parameters[0].std_error;
+  EXPECT_GT(exposure->std_uncertainty, 10 * std::log(2) * error_stops);
+  EXPECT_LT(exposure->std_uncertainty, 255 * std::log(2) * error_stops);
+  EXPECT_GE(all.combined, all.repeatability);
+  EXPECT_GE(all.largest, all.combined);
 }
 
 // Twenty sets: a minute.

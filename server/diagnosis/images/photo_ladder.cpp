@@ -9,6 +9,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/engine/candidate_ranking.h"
 #include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/images/photo_budget.h"
 #include "server/diagnosis/images/photo_covariates.h"
 #include "server/diagnosis/images/photo_formula.h"
 #include "server/diagnosis/images/photo_rest_kinds.h"
@@ -61,6 +62,11 @@ class PhotoLadder {
       AssessByPixels(photographs_, d_.noise_floor, quality);
     const double floor2 = std::pow(d_.noise_floor.sigma, 2), initial2 = std::pow(d_.initial->rmse, 2);
     d_.reducible_share = initial2 > floor2 ? 1 - floor2 / initial2 : 0;
+    TOUCHSTONE_ASSIGN_OR_RETURN(d_.uncertainty,
+                                BudgetOfPhotographs(photographs_, values_, selection_.covariance, improved_,
+                                                    d_.noise_floor.sigma, pool_));
+    uncertainty::AddMisfit({d_.final->rmse, d_.noise_floor.sigma, d_.final->lack_of_fit_p}, 1,
+                           &d_.uncertainty);
     const bool expectations_changed = changed_;
     AddPixelNoise(NoiseOfResiduals(photographs_, best, pool_), photographs_.set->photographs[0].channels,
                   *d_.final, &changed_, &improved_, &d_);

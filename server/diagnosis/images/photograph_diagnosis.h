@@ -11,6 +11,7 @@
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
 #include "server/session/image_set.h"
+#include "server/uncertainty/budget.h"
 
 namespace touchstone::diagnosis::images {
 
@@ -75,6 +76,8 @@ struct PhotographDiagnosis {
   std::optional<engine::UnexplainedRest> unexplained;
   int images_needed = 0;                       // with kTooLittleData
   std::optional<model::Model> improved_model;  // none: nothing changed
+  std::vector<uncertainty::Budget>
+      uncertainty;  // of its predictions, by object and of all; grey levels of one pixel
   std::vector<ProposedPhotograph> next_photographs;
 
   // Where.

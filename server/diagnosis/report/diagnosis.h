@@ -119,9 +119,10 @@ struct ReportedExplanation {
 // What one kind of measurement says.
 struct DataReport {
   DataKind kind = DataKind::kTouches;
-  std::string session;  // the path, or the session's name
-  int emulated = 0;     // rows that an emulator made: they measure nothing
-  int count = 0;        // touches or pictures that took part
+  std::string session;         // the path, or the session's name
+  std::string content_sha256;  // of what was measured, whatever file it stood in; empty: unknown
+  int emulated = 0;            // rows that an emulator made: they measure nothing
+  int count = 0;               // touches or pictures that took part
   SetAside set_aside;
   int needed = 0;  // with kTooLittleData; 0: this kind has enough
 
@@ -198,7 +199,7 @@ struct Diagnosis {
   std::optional<Sessions> sessions;
   // Of the model that the report ends with, and how well it predicts touches like these.
   std::optional<uncertainty::Posterior> posterior;
-  std::vector<uncertainty::Budget> uncertainty;
+  std::vector<uncertainty::Budget> uncertainty;  // in the unit of data[0]
 
   std::string summary;                // one paragraph
   std::vector<std::string> warnings;  // what limits all this

@@ -69,6 +69,7 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
   }
   diagnosis.confounded = found.confounded;
   diagnosis.improved_model = found.improved_model;
+  diagnosis.uncertainty = found.uncertainty;
   diagnosis.summary = found.summary;
   diagnosis.warnings = found.warnings;
   diagnosis.duration_s = found.duration_s;

@@ -10,6 +10,7 @@
 #include "server/effects/all_effects.h"
 #include "server/model/finger_name.h"
 #include "server/session/emulated.h"
+#include "server/session/touch_content.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -22,6 +23,7 @@ DataReport DataOf(const session::MeasurementSet& set, const distributions::PoseF
   data.kind = DataKind::kDistributions;
   data.session = set.origin;
   data.emulated = session::CountEmulated(set);
+  data.content_sha256 = session::TouchContentSha256(set);
   data.count = rows.compared;
   for (int i = 0; i < set.fingers; ++i) data.fingers.push_back(model::FingerName(i, set.fingers));
   data.rows = set.size();

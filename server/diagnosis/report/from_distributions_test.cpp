@@ -27,6 +27,7 @@ DiagnosisInput Input() {
   set->fingers = 3;
   set->objects = {"wedge"};
   set->object.assign(72, 0);
+  set->time_s.assign(72 * 3, 0);
   DiagnosisInput input;
   input.set = set;
   input.model = NoisyModel();

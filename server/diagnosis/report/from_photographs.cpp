@@ -79,6 +79,7 @@ DataReport DataOf(const images::PhotographDiagnosis& found, const session::Image
   data.kind = DataKind::kPhotographs;
   data.session = set.origin;
   data.emulated = session::CountEmulated(set);
+  data.content_sha256 = set.sha256;
   data.count = found.images;
   if (found.verdict == engine::Verdict::kTooLittleData) data.needed = found.images_needed;
   std::set<std::vector<double>> poses;
@@ -113,6 +114,7 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   data.reducible_share = found.reducible_share;
   AddWhere(found, set, &data);
   AddCauses(found, &diagnosis);
+  diagnosis.uncertainty = found.uncertainty;
   for (const images::ProposedPhotograph& next : found.next_photographs) diagnosis.next.emplace_back(next);
   diagnosis.warnings = found.warnings;
   diagnosis.duration_s = found.duration_s;

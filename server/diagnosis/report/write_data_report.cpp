@@ -125,7 +125,6 @@ void WriteUnexplained(const Unexplained& rest, v1::Unexplained* message) {
   message->set_formula(rest.formula);
   message->set_formula_yaml(rest.formula_yaml);
   message->set_lookup_yaml(rest.lookup_yaml);
-  if (rest.model_with) message->set_model_yaml(model::FormatModel(*rest.model_with));
   message->set_heldout_gain(rest.heldout_gain);
   message->set_words(rest.words);
   WriteParameters(rest.parameters, message->mutable_parameters());

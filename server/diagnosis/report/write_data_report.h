@@ -8,6 +8,7 @@
 
 namespace touchstone::diagnosis::report {
 
+// All but the model of what is unexplained.
 v1::DataReport ToMessage(const DataReport& data);
 
 // Its parts that belong to one kind: write_touches.cpp, write_photographs.cpp, write_distributions.cpp.

@@ -1,6 +1,7 @@
 #include "server/diagnosis/report/write_report.h"
 
 #include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/model_text.h"
 #include "server/diagnosis/report/write_answers.h"
 #include "server/diagnosis/report/write_data_report.h"
 #include "server/diagnosis/report/write_sessions.h"
@@ -88,6 +89,26 @@ void WriteCauses(const Diagnosis& diagnosis, v1::Report* report) {
   }
 }
 
+// Every model file of the report.
+void WriteModels(const Diagnosis& diagnosis, v1::Report* report) {
+  if (diagnosis.improved_model) {
+    report->set_improved_model_yaml(ImprovedModelText(diagnosis, *diagnosis.improved_model));
+    report->set_improved_model_hash(diagnosis.improved_model->Hash());
+  }
+  for (size_t i = 0; i < diagnosis.data.size(); ++i)
+    if (diagnosis.data[i].unexplained && diagnosis.data[i].unexplained->model_with)
+      report->mutable_data(static_cast<int>(i))
+          ->mutable_unexplained()
+          ->set_model_yaml(SuggestedModelText(diagnosis, static_cast<int>(i)));
+  if (!diagnosis.sessions || !diagnosis.sessions->changes) return;
+  const Sessions& sessions = *diagnosis.sessions;
+  v1::SessionComparison* message = report->mutable_sessions();
+  for (int session = 0; session < sessions.count; ++session) message->add_model_yaml("");
+  for (size_t i = 0; i < sessions.taking_part.size(); ++i)
+    message->set_model_yaml(sessions.taking_part[i],
+                            ImprovedModelText(diagnosis, sessions.changes->models[i]));
+}
+
 }  // namespace
 
 v1::Report ToReport(const Diagnosis& diagnosis) {
@@ -101,10 +122,7 @@ v1::Report ToReport(const Diagnosis& diagnosis) {
   for (const DataReport& data : diagnosis.data) *report.add_data() = ToMessage(data);
   if (diagnosis.p_nothing_missing) report.set_p_nothing_missing(*diagnosis.p_nothing_missing);
   report.set_hypotheses_tried(static_cast<uint32_t>(diagnosis.hypotheses_tried));
-  if (diagnosis.improved_model) {
-    report.set_improved_model_yaml(model::FormatModel(*diagnosis.improved_model));
-    report.set_improved_model_hash(diagnosis.improved_model->Hash());
-  }
+  WriteModels(diagnosis, &report);
   for (const NextMeasurement& next : diagnosis.next)
     std::visit([&report](const auto& proposed) { WriteNext(proposed, report.add_next()); }, next);
   for (const engine::DetectableValue& value : diagnosis.detectable)

@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/report/example_diagnosis.h"
+#include "server/model/provenance.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
 using engine::Verdict;
 using testing::ElementsAre;
+using testing::StartsWith;
 
 TEST(ToReport, GivesTimesInMicroseconds) {
   const v1::Report report = ToReport(ExampleDiagnosis(Verdict::kAdequate));
@@ -78,6 +80,31 @@ TEST(ToReport, WithoutAStepHasNone) {
   EXPECT_EQ(report.improved_model_yaml(), "");
 }
 
+TEST(ToReport, EveryModelSaysWhatItWasFittedTo) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
+  diagnosis.improved_model.emplace();
+  DataReport& data = diagnosis.data[0];
+  data.content_sha256 = "0f3a";
+  data.unexplained.emplace();
+  data.unexplained->model_with.emplace();
+  data.unexplained->rmse = 1234;
+  const v1::Report report = ToReport(diagnosis);
+  const auto said = [](const std::string& yaml) { return *model::ReadProvenance(yaml, "model"); };
+  const model::Provenance improved = said(report.improved_model_yaml());
+  EXPECT_EQ(improved.over_hash, diagnosis.model_hash);
+  ASSERT_EQ(improved.fitted_to.size(), 1u);
+  EXPECT_EQ(improved.fitted_to[0].set, data.session);
+  EXPECT_EQ(improved.fitted_to[0].sha256, "0f3a");
+  EXPECT_EQ(improved.fitted_to[0].unit, "us");
+  EXPECT_EQ(improved.fitted_to[0].rmse_before, data.initial->rmse);
+  EXPECT_EQ(improved.fitted_to[0].rmse_after, data.final->rmse);
+  EXPECT_EQ(said(report.data(0).unexplained().model_yaml()).fitted_to[0].rmse_after, 1234);
+  // A session that took no part was not fitted to.
+  diagnosis.data.push_back(data);
+  diagnosis.data[1].needed = 40;
+  EXPECT_EQ(said(ToReport(diagnosis).improved_model_yaml()).fitted_to.size(), 1u);
+}
+
 TEST(ToReport, HasAStepWithItsValuesInTheUnitsOfFiles) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kMissingEffects);
   diagnosis.steps = {ExampleStep("tip_radius")};
@@ -85,7 +112,7 @@ TEST(ToReport, HasAStepWithItsValuesInTheUnitsOfFiles) {
   diagnosis.improved_model.emplace();
   diagnosis.improved_model->name = "better";
   const v1::Report report = ToReport(diagnosis);
-  EXPECT_EQ(report.improved_model_yaml(), model::FormatModel(*diagnosis.improved_model));
+  EXPECT_THAT(report.improved_model_yaml(), StartsWith(model::FormatModel(*diagnosis.improved_model)));
   EXPECT_EQ(report.improved_model_hash(), diagnosis.improved_model->Hash());
   ASSERT_EQ(report.steps_size(), 1);
   const v1::Step& step = report.steps(0);

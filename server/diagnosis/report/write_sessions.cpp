@@ -86,9 +86,6 @@ void WriteSessions(const Sessions& sessions, v1::SessionComparison* message) {
   if (sessions.changes) {
     for (const joint::ComparedEffect& effect : sessions.changes->effects)
       WriteEffect(effect, sessions.taking_part, message->add_effects());
-    for (int session = 0; session < sessions.count; ++session) message->add_model_yaml("");
-    for (size_t i = 0; i < sessions.taking_part.size(); ++i)
-      message->set_model_yaml(sessions.taking_part[i], model::FormatModel(sessions.changes->models[i]));
   }
   for (const Sessions::Pair& pair : sessions.same_poses) {
     v1::SamePoses* to = message->add_same_poses();

@@ -6,6 +6,7 @@
 
 namespace touchstone::diagnosis::report {
 
+// All but the models.
 void WriteSessions(const Sessions& sessions, v1::SessionComparison* message);
 
 }  // namespace touchstone::diagnosis::report

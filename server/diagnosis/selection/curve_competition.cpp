@@ -19,7 +19,8 @@ constexpr double kMemoryNats = 10;  // noise with memory must be ahead of a curv
 constexpr double kRougherNats = 3;  // ... and than a course without corners
 constexpr double kOvertakenNats = 3;  // a curve alone that is this much better takes a named effect's place
 
-constexpr double kBeyondWanderNats = 60;  // an effect worth as much is no mean or trend of a wander
+constexpr double kBeyondCorrelatedNats =
+    60;  // an effect worth as much is no mean or trend of correlated noise
 constexpr double kWorthUnderMemoryNats = 10;
 constexpr double kDroppedNats = 15;  // that it must be better by for each named effect it needs beside it
 
@@ -59,8 +60,8 @@ class Competition {
     if (best == found.end()) return LookForMemory(named);
     if (result_.formula >= 0 && FormulaSaysTheSame(*best)) return DescribeBesideFormula();
     if (best->curve.of_time) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool wanders, IsNoiseWithMemory(*best));
-      if (wanders) return absl::OkStatus();
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool correlated, IsNoiseWithMemory(*best));
+      if (correlated) return absl::OkStatus();
     }
     return Adopt(*best);
   }
@@ -126,10 +127,10 @@ class Competition {
     return effect.needs.session_time ? curve.one_finger_line_nats : curve.one_finger_constant_nats;
   }
 
-  // A wander's mean and trend look like a constant and a drift of each finger.
-  absl::Status NoteWander(int index, const engine::Fit& named, const engine::Fit& without) {
+  // The mean and trend of correlated noise look like a constant and a drift of each finger.
+  absl::Status NoteCorrelatedNoise(int index, const engine::Fit& named, const engine::Fit& without) {
     const model::Effect& effect = *named.model.base().effects[index].effect;
-    if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kBeyondWanderNats)
+    if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kBeyondCorrelatedNats)
       return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> with, MemoryOf(named));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> alone, MemoryOf(without));
@@ -138,7 +139,7 @@ class Competition {
                        0.5 * (workspace_.searched->fingers - 1) * with->complexity_nats;
     const double ahead_nats = alone->log_likelihood - alone->complexity_nats - own;
     NoteRival(engine::NameOf(effect), ahead_nats,
-              "Noise with memory would say nearly the same: a wander of the fingers.");
+              "Correlated noise of the fingers would say nearly the same.");
     return absl::OkStatus();
   }
 
@@ -178,7 +179,7 @@ class Competition {
     const double behind = without.log_evidence - own;
     for (const std::string& name : names)
       NoteRival(name, behind + curves[0].any_gain_nats, RivalInWords(curves[0]));
-    if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteWander(steps[0], *named, without));
+    if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteCorrelatedNoise(steps[0], *named, without));
     if (!IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
@@ -208,7 +209,7 @@ class Competition {
     }
   }
 
-  // A wander has no course that another session would repeat: it is noise, which a curve only traces.
+  // Correlated noise has no course that another session would repeat: it is noise, which a curve only traces.
   absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<NoiseMemory> memory, MemoryOf(with.fit));
     if (!memory || !memory->everywhere ||
@@ -218,15 +219,15 @@ class Competition {
         memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
       return false;
     result_.fit = with.fit;
-    TOUCHSTONE_RETURN_IF_ERROR(DropWhatWandered(&*memory));
+    TOUCHSTONE_RETURN_IF_ERROR(DropWhatIsCorrelated(&*memory));
     result_.memory = std::move(memory);
     result_.without_formula = result_.fit;
     result_.formula = -1;
     return true;
   }
 
-  // Effects that were found under noise without memory must be worth their values under a wander too.
-  absl::Status DropWhatWandered(NoiseMemory* memory) {
+  // Effects that were found under noise without memory must be worth their values under correlated noise too.
+  absl::Status DropWhatIsCorrelated(NoiseMemory* memory) {
     for (int index = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
          index >= result_.initial_effects; --index) {
       TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,

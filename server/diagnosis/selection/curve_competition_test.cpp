@@ -48,7 +48,7 @@ TEST(CurveCompetition, ALengthKeepsItsName) {
   EXPECT_GT(result.steps[0].probability, 0.9);
 }
 
-TEST(CurveCompetition, AWanderIsNoiseWithMemory) {
+TEST(CurveCompetition, CorrelatedNoiseIsNoiseWithMemory) {
   TOUCHSTONE_SECOND_TIER("statistical: several sets");
   const SelectionResult result = ResultFor("correlated_noise", {"sigma_us=6000", "time_s=200"});
   ASSERT_TRUE(result.memory);

@@ -56,7 +56,7 @@ struct SelectionResult {
   engine::NothingMissing nothing_missing;  // of the model as it was given, over all that is tried
   touches::NoiseFindings noise;
   std::optional<NoiseMemory>
-      memory;  // the wander that the residuals follow, where no curve describes them better
+      memory;  // the correlated noise that the residuals follow, where no curve describes them better
   std::optional<GroupDifference> group;  // its touches are left out of the explanation
   std::optional<PartialOffset> partial;  // that a part of the touches has: no effect is named in its place
   SurfaceErrorFinding surface_error;

@@ -10,7 +10,7 @@ namespace {
 constexpr double kKeptS = 240;
 constexpr double kBucketS = 0.25;  // of each bucket the best bounds are kept
 constexpr int kKeptInBucket = 5;
-constexpr double kWander = 2e-8;      // change of rate in a second: 1.2 ppm a minute
+constexpr double kRateDrift = 2e-8;   // change of rate in a second: 1.2 ppm a minute
 constexpr double kMaxRate = 1e-3;     // off the nominal one
 constexpr double kRateSpread = 2e-4;  // standard, before anything is known
 constexpr double kAsymmetry = 0.1;    // standard, of the shortest round trip
@@ -20,7 +20,7 @@ constexpr double kSettledS = 0.2;
 
 // Bounds closer than this count as part of the envelope.
 double Loosening(double age_s) {
-  return 0.5 * kWander * age_s * age_s;
+  return 0.5 * kRateDrift * age_s * age_s;
 }
 
 }  // namespace
@@ -287,7 +287,7 @@ bool ClockSync::Fit(double window_s, ClockEstimate* estimate) const {
   const double slope_variance = std::max(0.0, slope_squares / weights - slope_off * slope_off);
   estimate->offset_uncertainty_s = nominal_rate_ * std::sqrt(variance + kMinScaleS * kMinScaleS);
   // The rate of now is not that of the time over which it was measured.
-  estimate->rate_uncertainty = nominal_rate_ * std::sqrt(slope_variance + std::pow(kWander * centre, 2));
+  estimate->rate_uncertainty = nominal_rate_ * std::sqrt(slope_variance + std::pow(kRateDrift * centre, 2));
   return true;
 }
 

@@ -30,7 +30,7 @@ struct ClockEstimate {
 // What cannot be seen is which part of the shortest round trip each way takes. Halves are assumed, and a
 // tenth of the shortest round trip is part of the uncertainty.
 //
-// Bounds are kept for four minutes of host time and loosen with age as a clock may wander (1.2 ppm a minute
+// Bounds are kept for four minutes of host time and loosen with age as a clock may drift (1.2 ppm a minute
 // of host time). What contradicts the estimate is put aside; four contradictions in succession that agree (a
 // reset, a step) start it anew.
 class ClockSync {

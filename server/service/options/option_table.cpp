@@ -31,6 +31,7 @@
 #include "server/base/text.h"
 #include "server/base/version.h"
 #include "server/base/whole_number.h"
+#include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"
 
 namespace touchstone::service {
@@ -211,6 +212,7 @@ absl::StatusOr<CommandLine> ReadCommandLine(const std::string& program, const st
   AddFlags(options, &app);
   line.done = PrintedManPage(app, argc, argv);
   if (line.done) return line;
+  app.formatter(std::make_shared<HelpLayout>());
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

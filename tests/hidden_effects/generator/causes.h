@@ -1,4 +1,4 @@
-// Causes that no entry of the catalogue describes as it stands: what wanders, begins or levels off with time, acts on
+// Causes that no entry of the catalogue describes as it stands: what drifts, begins or levels off with time, acts on
 // one object only, or belongs to one pose or one round. Written from their definitions alone.
 #pragma once
 

@@ -167,10 +167,10 @@ TEST(HiddenCause, AWalkSpreadsWithTheSquareRootOfTime) {
 }
 
 TEST(HiddenCause, NoiseWithMemoryLeavesTheOtherNoiseAsItIs) {
-  Scenario plain = TwoPlates({}), wandering = TwoPlates({{CauseKind::kRandomWalk, 5000, {}, {}}});
+  Scenario plain = TwoPlates({}), walking = TwoPlates({{CauseKind::kRandomWalk, 5000, {}, {}}});
   std::vector<Command> commands(20, Leaning());
-  const Set without = GenerateFor(plain, commands, 5), with = GenerateFor(wandering, commands, 5);
-  const auto added = AddedNoiseUs(wandering.causes[0], 5, with.session_time_s, 3);
+  const Set without = GenerateFor(plain, commands, 5), with = GenerateFor(walking, commands, 5);
+  const auto added = AddedNoiseUs(walking.causes[0], 5, with.session_time_s, 3);
   EXPECT_EQ(with.exact_time_us, without.exact_time_us);
   for (size_t k = 0; k < added.size(); ++k)
     EXPECT_NEAR(with.reported_us[k] - without.reported_us[k], added[k], 1e-3);

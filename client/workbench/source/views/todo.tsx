@@ -1,6 +1,7 @@
 // What to do: mistakes of the file to fix, effects to add, values to change, the improved model.
 import { Bar, Code, IntervalPicture, Section, Table, Terms } from "../parts/parts";
 import { before, effectProbability, error, interval, join, typeset, valueName, withError } from "../format";
+import { download } from "../charts/export";
 import { page, step } from "../state";
 import type { Step, Value } from "../data/report";
 
@@ -73,6 +74,7 @@ export function Todo() {
         <details class="model">
           <summary>The improved model{report.improved_model_hash && <> <code title={report.improved_model_hash}>{report.improved_model_hash.slice(0, 12)}</code></>}</summary>
           <Code text={report.improved_model_yaml} label="The improved model" />
+          <button type="button" onClick={() => download("better.yaml", "text/yaml", report.improved_model_yaml)}>Save the improved model</button>
         </details>
       )}
     </Section>

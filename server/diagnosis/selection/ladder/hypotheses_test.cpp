@@ -37,7 +37,7 @@ TEST(Hypotheses, NothingFoundLeavesNothingAndAllowsEveryQuestion) {
 TEST(Hypotheses, CorrelatedNoiseIsExplainedAndARandomWalkIsNot) {
   Hypotheses correlated, walk;
   correlated.Add(Hypothesis::kCorrelatedNoise);
-  walk.Add(Hypothesis::kRandomWalk, "The fingers wander.");
+  walk.Add(Hypothesis::kRandomWalk, "The fingers drift.");
   EXPECT_FALSE(correlated.Leave(Leaves::kScatter));
   EXPECT_TRUE(walk.Leave(Leaves::kMeans));
   for (const Hypotheses& memory : {correlated, walk}) {

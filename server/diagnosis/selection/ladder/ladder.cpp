@@ -95,11 +95,12 @@ class LadderBuilder {
       NameTimeFirst(observations_, ladder_.noise_floor, rest);
     };
     if (selection_.memory && IsRandomWalk())
-      found_.Add(Hypothesis::kRandomWalk,
-                 "The fingers wander through the whole session, and nothing shows that they come back: a "
-                 "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
-                 "session.",
-                 name_time);
+      found_.Add(
+          Hypothesis::kRandomWalk,
+          "The fingers drift through the whole session, and nothing shows that they revert to a mean: a "
+          "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
+          "session.",
+          name_time);
     else if (selection_.memory)
       found_.Add(Hypothesis::kCorrelatedNoise);
     if (found_.Allows(Question::kCourse) && SharesTime(ladder_.noise_floor))
@@ -117,7 +118,7 @@ class LadderBuilder {
   // model says so.
   bool IsRandomWalk() const {
     const auto& given = workspace_.input.model->effects;
-    return !Forgets(*selection_.memory) &&
+    return !RevertsToMean(*selection_.memory) &&
            std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
              return instance.effect->role == model::EffectRole::kNoiseMemory;
            });

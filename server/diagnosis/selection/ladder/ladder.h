@@ -40,14 +40,14 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* 
 // Its parts.
 
 // The kind of noise: steps where the model has none of it, refits where its values are others. Needs the ladder's
-// noise floor and final errors, which noise does not change. Where the noise `wanders`, or repeats share a course in
-// time, only its level, ticks and dropouts are judged: a wander by itself makes fingers differ and tails heavy.
-void AddNoiseSteps(touches::NoiseFindings noise, bool wanders, Ladder* ladder);
+// noise floor and final errors, which noise does not change. Where the noise is `correlated`, or repeats share a course in
+// time, only its level, ticks and dropouts are judged: correlated noise by itself makes fingers differ and tails heavy.
+void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder);
 
-// A wander of the fingers, as a step or a refit.
+// Correlated noise of the fingers, as a step or a refit.
 void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
 
-// Takes a wander out of the improved model that the given one has and the residuals rule out.
+// Takes correlated noise out of the improved model that the given one has and the residuals rule out.
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);
 
 // What depends on which covariate where no named effect explains it, and a formula, if one was found. `final`:

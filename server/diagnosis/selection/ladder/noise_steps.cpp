@@ -76,7 +76,7 @@ class NoiseStepWriter {
     ladder_.improved.effects.back().values = std::move(values);
   }
 
-  // The wander has two parameters; a model that has it keeps values that are not clearly others.
+  // Correlated noise has two parameters; a model that has it keeps values that are not clearly others.
   void WriteMemory(const NoiseMemory& memory) {
     const auto effect = effects::FindByRole(model::EffectRole::kNoiseMemory);
     const std::vector<engine::ParameterEstimate> estimates = {Estimate(effect->parameters[0], memory.sigma_s),
@@ -174,7 +174,7 @@ void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder) {
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder) {
   for (const model::EffectInstance& instance : ladder->improved.effects) {
     if (instance.effect->role != model::EffectRole::kNoiseMemory || !instance.object_values.empty()) continue;
-    if (!WanderIsAbsent(observations, ladder->residuals, instance.values[0], instance.values[1])) return;
+    if (!NoiseMemoryIsAbsent(observations, ladder->residuals, instance.values[0], instance.values[1])) return;
     NoiseStepWriter(ladder).Remove(model::EffectRole::kNoiseMemory);
     return;
   }
@@ -200,9 +200,9 @@ touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine
 
 }  // namespace
 
-void AddNoiseSteps(touches::NoiseFindings noise, bool wanders, Ladder* ladder) {
+void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder) {
   NoiseStepWriter writer(ladder);
-  if (wanders || SharesTime(ladder->noise_floor)) {
+  if (correlated || SharesTime(ladder->noise_floor)) {
     noise.slope = noise.degrees_of_freedom = noise.length_sigma_m = {};
     noise.channel_sigma_s.clear();
     noise.channels_absent = false;

@@ -11,7 +11,7 @@ namespace {
 constexpr int kMinComplete = 60;
 constexpr double kForgetsNats = 4;  // simulated walks of 960 touches: 1 in 300 is beyond
 
-// Orthonormal contrasts of complete touches: their channels wander independently of each other.
+// Orthonormal contrasts of complete touches: their correlated noise is independent of one another.
 struct Course {
   int channels = 0;
   std::vector<double> gap_s;  // since the touch before; infinite: a new session
@@ -40,7 +40,7 @@ Course CourseOf(const touches::Observations& o, const std::vector<double>& resid
   return course;
 }
 
-struct WanderLikelihood {
+struct CorrelatedLikelihood {
   double log_likelihood = 0;
   double white_s = 0;
 };
@@ -48,7 +48,7 @@ struct WanderLikelihood {
 // Of a level that moves between touches, seen through white noise of unit variance, whose size is profiled (Kalman
 // filter). `variance`: of the level before the first touch; `move(gap_s, &mean, &variance)`: what a pause does to it.
 template <typename Move>
-WanderLikelihood FilterLevel(const Course& course, double variance, const Move& move) {
+CorrelatedLikelihood FilterLevel(const Course& course, double variance, const Move& move) {
   const int n = course.touches(), channels = course.channels;
   std::vector<double> mean(channels, 0.0);
   double squares = 0, logs = 0;
@@ -68,8 +68,8 @@ WanderLikelihood FilterLevel(const Course& course, double variance, const Move& 
   return {-0.5 * count * std::log(white2) - 0.5 * logs, std::sqrt(white2)};
 }
 
-// Variance ratio wander / white, and correlation time; the white noise is profiled.
-WanderLikelihood Likelihood(const Course& course, double ratio, double time_s) {
+// Variance ratio correlated / white, and correlation time; the white noise is profiled.
+CorrelatedLikelihood Likelihood(const Course& course, double ratio, double time_s) {
   return FilterLevel(course, ratio, [&](double gap_s, std::vector<double>* mean, double* variance) {
     const double rho = std::exp(-gap_s / time_s);
     *variance = rho * rho * *variance + (1 - rho * rho) * ratio;
@@ -90,7 +90,7 @@ double WalkLogLikelihood(const Course& course, double start, double rate) {
   return FilterLevel(course, start, move).log_likelihood;
 }
 
-// The best walk: a wander spreads at first by 2 variance / time a second.
+// The best walk: correlated noise spreads at first by 2 variance / time a second.
 double BestWalk(const Course& course, double ratio, double time_s) {
   double best = -INFINITY;
   for (int a = -6; a <= 6; ++a)
@@ -102,7 +102,7 @@ double BestWalk(const Course& course, double ratio, double time_s) {
 // The same of a course without corners: a Matern process of order 3/2, whose slope is continuous, as a Kalman filter over
 // value and slope (Hartikainen and Sarkka, Kalman filtering and smoothing solutions to temporal Gaussian process
 // regression models, 2010).
-WanderLikelihood SmoothLikelihood(const Course& course, double ratio, double time_s) {
+CorrelatedLikelihood SmoothLikelihood(const Course& course, double ratio, double time_s) {
   const int n = course.touches(), channels = course.channels;
   const double rate = std::sqrt(3.0) / time_s;
   Eigen::Matrix2d stationary = Eigen::Matrix2d::Zero();
@@ -222,15 +222,15 @@ double PeriodGain(const Course& course) {
   return tried > 0 ? best - 0.5 * kPhases * channels * std::log(count) - std::log(tried) : best;
 }
 
-struct BestWander {
-  WanderLikelihood likelihood;
+struct BestCorrelated {
+  CorrelatedLikelihood likelihood;
   double ratio = 1, time_s = 0;
 };
 
 // The maximum of a likelihood: a coarse grid over ratio and time, then ever finer ones round the best.
-BestWander FindBest(WanderLikelihood (*likelihood)(const Course&, double, double), const Course& course,
-                    double min_s, double max_s) {
-  BestWander best;
+BestCorrelated FindBest(CorrelatedLikelihood (*likelihood)(const Course&, double, double),
+                        const Course& course, double min_s, double max_s) {
+  BestCorrelated best;
   best.time_s = std::sqrt(min_s * max_s);
   best.likelihood = likelihood(course, best.ratio, best.time_s);
   double ratio_width = std::log(1e3), time_width = 0.5 * std::log(max_s / min_s);
@@ -240,7 +240,7 @@ BestWander FindBest(WanderLikelihood (*likelihood)(const Course&, double, double
       for (int b = -4; b <= 4; ++b) {
         const double ratio = ratio_centre * std::exp(ratio_width * a / 4);
         const double time_s = std::clamp(time_centre * std::exp(time_width * b / 4), min_s, max_s);
-        const WanderLikelihood here = likelihood(course, ratio, time_s);
+        const CorrelatedLikelihood here = likelihood(course, ratio, time_s);
         if (here.log_likelihood > best.likelihood.log_likelihood) best = {here, ratio, time_s};
       }
     ratio_width *= 0.4;
@@ -262,9 +262,9 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   const double min_s = span_s / course.touches(), max_s = span_s / 2;
   if (!(min_s > 0)) return std::nullopt;
 
-  const BestWander wander = FindBest(Likelihood, course, min_s, max_s);
-  const WanderLikelihood& best = wander.likelihood;
-  const double ratio = wander.ratio, time_s = wander.time_s;
+  const BestCorrelated correlated = FindBest(Likelihood, course, min_s, max_s);
+  const CorrelatedLikelihood& best = correlated.likelihood;
+  const double ratio = correlated.ratio, time_s = correlated.time_s;
   const double count = static_cast<double>(course.touches()) * course.channels;
   NoiseMemory found;
   found.gain_nats = best.log_likelihood - Likelihood(course, 0, time_s).log_likelihood - std::log(count);
@@ -284,12 +284,12 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   return found;
 }
 
-bool Forgets(const NoiseMemory& memory) {
+bool RevertsToMean(const NoiseMemory& memory) {
   return memory.forgets_nats > kForgetsNats;
 }
 
-bool WanderIsAbsent(const touches::Observations& o, const std::vector<double>& residuals, double sigma_s,
-                    double time_s) {
+bool NoiseMemoryIsAbsent(const touches::Observations& o, const std::vector<double>& residuals, double sigma_s,
+                         double time_s) {
   constexpr double kRuledOutNats = 5;
   if (!o.set->has_session_time || o.fingers < 2 || !(sigma_s > 0)) return false;
   const Course course = CourseOf(o, residuals);
@@ -299,11 +299,11 @@ bool WanderIsAbsent(const touches::Observations& o, const std::vector<double>& r
   if (course.touches() < kMinComplete || time_s > 0.5 * span_s) return false;
   const double count = static_cast<double>(course.touches()) * course.channels;
   const double none = Likelihood(course, 0, time_s).log_likelihood;
-  // The wander has its size; the white noise beside it is what fits best.
+  // The correlated noise has its size; the white noise beside it is what fits best.
   double declared = -INFINITY;
   for (double log_ratio = std::log(1e-4); log_ratio < std::log(1e4); log_ratio += 0.1) {
     const double ratio = std::exp(log_ratio), white2 = sigma_s * sigma_s / ratio;
-    const WanderLikelihood profiled = Likelihood(course, ratio, time_s);
+    const CorrelatedLikelihood profiled = Likelihood(course, ratio, time_s);
     // The profile leaves a sum of squares of count times its own variance.
     const double over = profiled.white_s * profiled.white_s / white2;
     declared = std::max(declared, profiled.log_likelihood - 0.5 * count * (over - 1 - std::log(over)));

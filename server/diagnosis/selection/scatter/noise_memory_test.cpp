@@ -33,7 +33,7 @@ struct CourseOfSession {
   }
 };
 
-TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
+TEST(NoiseMemory, FindsSizeAndCorrelationTime) {
   double state[3] = {0, 0, 0};
   const CourseOfSession session(3, [&state](int, int i, RandomStream* random) {
     const double rho = std::exp(-10.0 / 300);
@@ -52,7 +52,7 @@ TEST(NoiseMemory, FindsSizeAndCorrelationTimeOfAWander) {
   EXPECT_GT(found->gain_nats, found->period_gain_nats + 20);
 }
 
-TEST(NoiseMemory, ACourseWithCornersThatRepeatsIsNoWander) {
+TEST(NoiseMemory, ACourseWithCornersThatRepeatsIsNoCorrelatedNoise) {
   const CourseOfSession session(
       5, [](int k, int i, RandomStream*) { return i == 0 ? 0.020 * std::fmod(10.0 * k, 600) / 600 : 0.0; });
   const auto found = FindNoiseMemory(session.o, session.residuals);
@@ -62,30 +62,30 @@ TEST(NoiseMemory, ACourseWithCornersThatRepeatsIsNoWander) {
   EXPECT_GT(found->period_gain_nats, found->gain_nats + 20);
 }
 
-TEST(NoiseMemory, AWalkDoesNotForgetAndAWanderDoes) {
+TEST(NoiseMemory, ARandomWalkDoesNotRevertAndCorrelatedNoiseDoes) {
   int walks = 0;
   for (uint64_t seed = 20; seed < 30; ++seed) {
-    double walked[3] = {0, 0, 0}, wandered[3] = {0, 0, 0};
+    double walked[3] = {0, 0, 0}, correlated[3] = {0, 0, 0};
     const CourseOfSession walk(
         seed, [&walked](int, int i, RandomStream* random) { return walked[i] += 0.0008 * random->Normal(); });
-    walks += !Forgets(*FindNoiseMemory(walk.o, walk.residuals));
-    const CourseOfSession wander(seed, [&wandered](int, int i, RandomStream* random) {
+    walks += !RevertsToMean(*FindNoiseMemory(walk.o, walk.residuals));
+    const CourseOfSession reverting(seed, [&correlated](int, int i, RandomStream* random) {
       const double rho = std::exp(-10.0 / 300);
-      return wandered[i] = rho * wandered[i] + 0.007 * std::sqrt(1 - rho * rho) * random->Normal();
+      return correlated[i] = rho * correlated[i] + 0.007 * std::sqrt(1 - rho * rho) * random->Normal();
     });
-    EXPECT_TRUE(Forgets(*FindNoiseMemory(wander.o, wander.residuals))) << seed;
+    EXPECT_TRUE(RevertsToMean(*FindNoiseMemory(reverting.o, reverting.residuals))) << seed;
   }
   EXPECT_GE(walks, 9);
 }
 
-TEST(NoiseMemory, GainsNothingWithoutAWander) {
+TEST(NoiseMemory, GainsNothingOfUncorrelatedNoise) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
     const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
     EXPECT_LT(FindNoiseMemory(session.o, session.residuals)->gain_nats, 2);
   }
 }
 
-TEST(NoiseMemory, APeriodAndAWarmUpAreSmootherThanAWander) {
+TEST(NoiseMemory, APeriodAndAWarmUpAreSmootherThanCorrelatedNoise) {
   for (const double amplitude_s : {0.006, 0.025}) {
     const CourseOfSession period(6, [=](int k, int i, RandomStream*) {
       return (i - 1) * amplitude_s * std::sin(2 * kPi * 10.0 * k / 1024);
@@ -100,30 +100,30 @@ TEST(NoiseMemory, APeriodAndAWarmUpAreSmootherThanAWander) {
   }
 }
 
-TEST(NoiseMemory, ASingleStepIsNoWander) {
+TEST(NoiseMemory, ASingleStepIsNoCorrelatedNoise) {
   const CourseOfSession session(4,
                                 [](int k, int i, RandomStream*) { return i == 1 && k > 400 ? 0.0125 : 0.0; });
   const auto found = FindNoiseMemory(session.o, session.residuals);
   EXPECT_GT(found->step_gain_nats, found->gain_nats);
 }
 
-TEST(NoiseMemory, AnEventIsNoWander) {
+TEST(NoiseMemory, AnEventIsNoCorrelatedNoise) {
   const CourseOfSession session(
       5, [](int k, int i, RandomStream*) { return i == 0 && k > 500 && k < 570 ? 0.012 : 0.0; });
   EXPECT_FALSE(FindNoiseMemory(session.o, session.residuals)->everywhere);
 }
 
-TEST(WanderIsAbsent, WhereThereIsNoiseWithoutMemoryOnly) {
+TEST(NoiseMemoryIsAbsent, WhereThereIsNoiseWithoutMemoryOnly) {
   for (uint64_t seed = 20; seed < 24; ++seed) {
     const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
-    EXPECT_TRUE(WanderIsAbsent(session.o, session.residuals, 0.007, 300));
+    EXPECT_TRUE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.007, 300));
     // These data could not show them.
-    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.0001, 300));
-    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.007, 9000));
+    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.0001, 300));
+    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.007, 9000));
   }
 }
 
-TEST(WanderIsAbsent, NotWhereItIs) {
+TEST(NoiseMemoryIsAbsent, NotWhereItIs) {
   for (uint64_t seed = 30; seed < 34; ++seed) {
     double state[3] = {0, 0, 0};
     const CourseOfSession session(seed, [&state](int, int i, RandomStream* random) {
@@ -131,7 +131,7 @@ TEST(WanderIsAbsent, NotWhereItIs) {
       state[i] = rho * state[i] + 0.004 * std::sqrt(1 - rho * rho) * random->Normal();
       return state[i];
     });
-    EXPECT_FALSE(WanderIsAbsent(session.o, session.residuals, 0.004, 300));
+    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.004, 300));
   }
 }
 
