@@ -13,6 +13,8 @@ namespace {
 constexpr int kMaxHalvings = 5;
 constexpr double kConverged = 0.02;  // nats
 constexpr double kSmallStep = 0.05;  // standard errors
+// Derivatives that are simulated, from which updating them saves more than the steps that it adds.
+constexpr int kMinUpdated = 2;
 
 // One simulation with all parameters of one shape moved; writes their columns.
 absl::Status DifferentiateShape(const Experiment& experiment, const Parameterization& model,
@@ -65,7 +67,12 @@ class GaussNewton {
       rough_.push_back(
           experiment_.observations->HasRoughDerivatives(*model_.base().effects[parameter.effect].effect));
     has_rough_derivatives_ = std::find(rough_.begin(), rough_.end(), true) != rough_.end();
+    updates_ =
+        experiment.update_derivatives && std::count(rough_.begin(), rough_.end(), false) >= kMinUpdated;
   }
+
+  // Whether the derivatives behind a step are those of the step before, updated.
+  bool updates() const { return updates_; }
 
   absl::Status Begin() {
     fit_->point = model_.Clip(model_.Start());
@@ -113,7 +120,7 @@ class GaussNewton {
         continue;
       }
       step.moved = true;
-      if (experiment_.update_derivatives) {
+      if (updates_) {
         fit_->columns = experiment_.likelihood->Prepare(UpdatedColumns(point, predicted, r.values));
       } else {
         // The old derivatives are good enough if the simulator did what they predicted.
@@ -177,7 +184,7 @@ class GaussNewton {
   Fit* fit_;
   std::vector<int> members_;
   std::vector<bool> rough_;  // by parameter: ObservationModel::HasRoughDerivatives
-  bool has_rough_derivatives_ = false;
+  bool has_rough_derivatives_ = false, updates_ = false;
 };
 
 }  // namespace
@@ -224,7 +231,7 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization star
     TOUCHSTONE_ASSIGN_OR_RETURN(const GaussNewton::Step step, search.MoveAlong(evidence));
     // Derivatives that were updated may lead nowhere, or end a fit too early: simulated ones have the last word.
     if (!step.moved && simulated) break;
-    simulate = !experiment.update_derivatives || !step.moved;
+    simulate = !search.updates() || !step.moved;
     if (!step.moved) continue;
     const LaplaceEvidence after = search.Evidence();
     // A full step that ended where the linearised prediction said needs no further derivatives.
