@@ -129,7 +129,8 @@ start_program() {
   trap stop_programs EXIT
   trap 'exit 130' INT
   trap 'exit 143' TERM
-  "$bin/$name" "$@" > "$log" 2>&1 < /dev/null &
+  : > "$log"  # before the program runs: what an earlier one announced there is not read
+  "$bin/$name" "$@" >> "$log" 2>&1 < /dev/null &
   pid=$!
   programs+=("$pid $name")
   until announced=$(sed -nE "/$ready /{s/.*$ready ([^ ]+).*/\\1/p;q}" "$log") && [[ -n $announced ]]; do
