@@ -27,17 +27,13 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr char kModel[] =
-    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
-    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
-
 class DiagnoseCommandTest : public RealBinaryTest {
  protected:
   // 24 poses `rounds` times on each of two objects, touched with balls for tips: set.csv. The meshes have names
   // of their own.
   void MakeSet(int rounds = 2) {
-    Write("nominal.yaml", kModel);
-    Write("tips.yaml", absl::StrCat(kModel, "  - tip_radius: {radius_mm: 3}\n"));
+    Write("nominal.yaml", kNominalModelFile);
+    Write("tips.yaml", absl::StrCat(kNominalModelFile, "  - tip_radius: {radius_mm: 3}\n"));
     std::filesystem::create_directories(Path("meshes"));
     const std::pair<const char*, const char*> shapes[] = {{"cup", "lat05"}, {"mug", "lat20"}};
     std::vector<client::MeasuredTouch> touches;
@@ -240,7 +236,7 @@ TEST_F(DiagnoseCommandTest, WhatIsReadIsNeverWrittenOver) {
   }
   EXPECT_EQ(Read("set.csv"), set);
   EXPECT_THAT(Run(Command("diagnose", {"--save-model", "./nominal.yaml"})).err, HasSubstr("never changed"));
-  EXPECT_EQ(Read("nominal.yaml"), kModel);
+  EXPECT_EQ(Read("nominal.yaml"), kNominalModelFile);
   const std::string mesh = Read("meshes/cup.off");
   EXPECT_THAT(Run(Command("propose", {"-o", "meshes/cup.off", "--force"})).err, HasSubstr("never changed"));
   EXPECT_EQ(Read("meshes/cup.off"), mesh);
@@ -318,7 +314,7 @@ TEST_F(DiagnoseCommandTest, HelpBeginsWithExamples) {
 TEST_F(DiagnoseCommandTest, AnInterruptEndsItSoon) {
   // Large, and of a model slow enough, that it is at work for long.
   MakeSet(200);
-  std::string model = kModel, terms = "travel_mm";
+  std::string model = kNominalModelFile, terms = "travel_mm";
   for (int k = 1; k < 40; ++k) absl::StrAppend(&terms, "+sin(", k, "*travel_mm)");
   for (int k = 0; k < 20; ++k)
     absl::StrAppend(&model, "  - formula: {name: slow", k, ", adds: time_us, expression: \"k*(", terms,

@@ -18,16 +18,12 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-constexpr char kModelFile[] =
-    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
-    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
-
 // A plan of 24 poses in two rounds on lat20, and what a rig with balls for tips measured of it: plan.csv, set.csv.
 class QuestionCommandTest : public RealBinaryTest {
  protected:
   void MakePlan() {
-    Write("nominal.yaml", kModelFile);
-    Write("tips.yaml", std::string(kModelFile) + "  - tip_radius: {radius_mm: 3}\n");
+    Write("nominal.yaml", kNominalModelFile);
+    Write("tips.yaml", std::string(kNominalModelFile) + "  - tip_radius: {radius_mm: 3}\n");
     ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2", "-o",
                    "plan.csv"})
                   .exit_code,

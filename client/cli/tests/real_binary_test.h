@@ -26,6 +26,14 @@ struct Outcome {
   std::string out, err;
 };
 
+// Model files of a rig with three fingers and nothing but noise: 5 ms, as rigs usually have, and 2 ms.
+inline constexpr char kNominalModelFile[] =
+    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
+inline constexpr char kQuietModelFile[] =
+    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
+    "effects:\n  - gaussian_noise: {sigma_us: 2000}\n";
+
 class RealBinaryTest : public ::testing::Test {
  protected:
   std::string Path(const std::string& name) const { return folder_.Path(name); }

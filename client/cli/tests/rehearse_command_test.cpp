@@ -16,15 +16,11 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr char kRehearsedModel[] =
-    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
-    "effects:\n  - gaussian_noise: {sigma_us: 5000}\n";
-
 class RehearseCommandTest : public RealBinaryTest {
  protected:
   void SetUp() override {
     RealBinaryTest::SetUp();
-    Write("nominal.yaml", kRehearsedModel);
+    Write("nominal.yaml", kNominalModelFile);
     ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "2", "-o",
                    "plan.csv"})
                   .exit_code,

@@ -16,15 +16,11 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr char kSteadyModel[] =
-    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
-    "effects:\n  - gaussian_noise: {sigma_us: 2000}\n";
-
 class SessionsCommandTest : public RealBinaryTest {
  protected:
   void SetUp() override {
     RealBinaryTest::SetUp();
-    Write("nominal.yaml", kSteadyModel);
+    Write("nominal.yaml", kQuietModelFile);
     ASSERT_EQ(Run({"plan", "lat20", "--plan", "faces", "--samples-per-face", "4", "--rounds", "3", "-o",
                    "plan.csv"})
                   .exit_code,
@@ -32,7 +28,7 @@ class SessionsCommandTest : public RealBinaryTest {
   }
   // A session of the plan by a rig whose tips have this radius.
   void MakeSession(const std::string& file, double radius_mm, int seed) {
-    Write("rig.yaml", absl::StrCat(kSteadyModel, "  - tip_radius: {radius_mm: ", radius_mm, "}\n"));
+    Write("rig.yaml", absl::StrCat(kQuietModelFile, "  - tip_radius: {radius_mm: ", radius_mm, "}\n"));
     ASSERT_EQ(Run({"touch", "--plan", "plan.csv", "--model", "rig.yaml", "--seed", std::to_string(seed), "-o",
                    file})
                   .exit_code,

@@ -18,16 +18,12 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr char kQuietModel[] =
-    "touchstone: model/1\nname: nominal\nend_effector: {fingers: 3, spacing_mm: 30}\n"
-    "effects:\n  - gaussian_noise: {sigma_us: 2000}\n";
-
 class SurfaceMapCommandTest : public RealBinaryTest {
  protected:
   // Touches of two printed objects, in a file; the bumps depend on the model's seed alone, poses on the plan's.
   void MakeBumpySet(const std::string& name, const std::string& plan_seed) {
-    Write("nominal.yaml", kQuietModel);
-    Write("bumpy.yaml", absl::StrCat(kQuietModel, "  - surface_error: {rms_mm: 0.3, length_mm: 40}\n"));
+    Write("nominal.yaml", kQuietModelFile);
+    Write("bumpy.yaml", absl::StrCat(kQuietModelFile, "  - surface_error: {rms_mm: 0.3, length_mm: 40}\n"));
     std::filesystem::create_directories(Path("meshes"));
     for (const char* shape : {"lat00", "lat20"})
       ASSERT_EQ(Run({"mesh", "supershape", shape, "--triangles", "2000", "-o",
@@ -102,7 +98,7 @@ TEST_F(SurfaceMapCommandTest, IsFoundAppliedSentAndWrittenAsAMesh) {
 }
 
 TEST_F(SurfaceMapCommandTest, ErrorsNameFileLineAndValue) {
-  Write("bad.yaml", absl::StrCat(kQuietModel, "  - surface_map: {file: map.csv}\n"));
+  Write("bad.yaml", absl::StrCat(kQuietModelFile, "  - surface_map: {file: map.csv}\n"));
   Outcome outcome = Run({"model", "show", "bad.yaml"});
   EXPECT_NE(outcome.exit_code, 0);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("bad.yaml:6"), HasSubstr("map.csv")));
@@ -129,7 +125,7 @@ TEST_F(SurfaceMapCommandTest, ErrorsNameFileLineAndValue) {
 TEST_F(SurfaceMapCommandTest, GoesAlongWhenAModelIsChanged) {
   Write("map.csv",
         "object,x_mm,y_mm,z_mm,departure_mm,std_dev_mm,length_mm,rms_mm\nlat00,0,0,75,0.2,0.1,20,0.3\n");
-  Write("nominal.yaml", kQuietModel);
+  Write("nominal.yaml", kQuietModelFile);
   ASSERT_EQ(
       Run({"model", "add", "nominal.yaml", "surface_map", "file=map.csv", "-o", "mapped.yaml"}).exit_code, 0);
   EXPECT_EQ(Read("mapped.surface.csv"), Read("map.csv"));
