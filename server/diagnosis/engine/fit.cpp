@@ -229,7 +229,8 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization star
         search.DistanceLeft(evidence) < experiment.near_enough)
       break;
     TOUCHSTONE_ASSIGN_OR_RETURN(const GaussNewton::Step step, search.MoveAlong(evidence));
-    // Derivatives that were updated may lead nowhere, or end a fit too early: simulated ones have the last word.
+    // Derivatives that were updated may lead nowhere, or end a fit too early: simulated ones, or those of `part`, have the last
+    // word.
     if (!step.moved && simulated) break;
     simulate = !search.updates() || !step.moved;
     if (!step.moved) continue;
