@@ -24,7 +24,7 @@ struct RehearsedCase {
   bool is_outside = false;
   bool is_mistake = false;  // two fingers are exchanged in the file
   bool last_only = false;   // hidden in the last session alone; so is every mistake
-  model::Model given;       // that is diagnosed
+  model::Model given = {};  // that is diagnosed
   double predicted = -1;    // chance that a check gives for the effect to be found; < 0: none
 
   bool IsHiddenIn(int session, int sessions) const { return !last_only || session == sessions - 1; }

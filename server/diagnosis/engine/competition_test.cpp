@@ -90,42 +90,6 @@ TEST_F(CompetitionTest, CandidateWithoutANameCountsAndIsNotListed) {
   EXPECT_TRUE((*steps)[0].competing.empty());
 }
 
-TEST_F(CompetitionTest, StepsComeInTheOrderInWhichTheyExplainMost) {
-  rows.measured += kHiddenM * rows.columns["object_push"] + 3 * kHiddenM * rows.columns["gravity_sag"];
-  const StepwiseSearch search = Search({"object_push", "gravity_sag"});
-  const Explanation whole = Explained(search);
-  const auto steps = FindCompetitors(search, whole, -1, {});
-  const auto ordered = OrderSteps(experiment, whole, -1, *steps, {});
-  ASSERT_TRUE(ordered.ok() && ordered->size() == 2);
-  const auto name = [&](const OrderedStep& step) {
-    return whole.fit.model.base().effects[step.step->effect].effect->name;
-  };
-  EXPECT_EQ(name((*ordered)[0]), "gravity_sag");
-  EXPECT_EQ((*ordered)[0].fit.model.size(), 1);
-  EXPECT_FALSE((*ordered)[0].whole);
-  EXPECT_EQ(name((*ordered)[1]), "object_push");
-  EXPECT_TRUE((*ordered)[1].whole);
-}
-
-TEST_F(CompetitionTest, StepsAtTheEndComeAfterAllOthersInTheirOrder) {
-  rows.measured += kHiddenM * rows.columns["object_push"] + 2 * kHiddenM * rows.columns["oblique_slip"] +
-                   3 * kHiddenM * rows.columns["gravity_sag"];
-  const StepwiseSearch search = Search({"object_push", "oblique_slip", "gravity_sag"});
-  const Explanation whole = Explained(search);
-  const auto steps = FindCompetitors(search, whole, -1, {});
-  const auto usual = OrderSteps(experiment, whole, -1, *steps, {});
-  ASSERT_TRUE(usual.ok() && usual->size() == 3);
-  const int first = (*usual)[0].step->effect, second = (*usual)[1].step->effect,
-            third = (*usual)[2].step->effect;
-  const auto ordered = OrderSteps(experiment, whole, -1, *steps, {second, first});
-  ASSERT_TRUE(ordered.ok() && ordered->size() == 3);
-  EXPECT_EQ((*ordered)[0].step->effect, third);
-  EXPECT_EQ((*ordered)[1].step->effect, second);
-  EXPECT_EQ((*ordered)[2].step->effect, first);
-  EXPECT_FALSE((*ordered)[1].whole);
-  EXPECT_TRUE((*ordered)[2].whole);
-}
-
 TEST_F(CompetitionTest, ValueOfTheModelThatIsZeroIsSuperfluousAndAnotherIsRefitted) {
   rows.measured += kHiddenM * rows.columns["gravity_sag"];
   model::Model given = model::NominalModel();

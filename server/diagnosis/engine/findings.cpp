@@ -2,6 +2,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/candidate_ranking.h"
+#include "server/diagnosis/engine/step_order.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
@@ -20,16 +21,12 @@ class Finder {
 
   absl::StatusOr<Findings> Run() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const Quality initial, modality_.Compare(modality_.given()));
-    for (StepsAtEnd at_end;;) {
+    for (;;) {
       found_ = Findings();
       found_.initial = initial;
-      TOUCHSTONE_RETURN_IF_ERROR(Climb(at_end.effects()));
-      const int step = StepWithoutGain(initial, QualitiesOf(found_.steps));
-      if (step < 0) break;
-      if (at_end.MoveToEnd(climbed_[step], climbed_)) continue;
-      at_end.TakeOut(climbed_[step]);
-      TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit,
-                                  FitModel(experiment_, whole_.fit.model.Without(climbed_[step])));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const int without_gain, Climb());
+      if (without_gain < 0) break;
+      TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit, FitModel(experiment_, whole_.fit.model.Without(without_gain)));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
     if (found_.steps.empty() && found_.final.rmse > initial.rmse) {
@@ -45,8 +42,8 @@ class Finder {
   }
 
  private:
-  // Values, steps and their errors of the explanation as it stands.
-  absl::Status Climb(const std::vector<int>& at_end) {
+  // Values, steps and their errors of the explanation as it stands. Returns StepOrder::without_gain.
+  absl::StatusOr<int> Climb() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const FinalRows rows, modality_.RowsNear(whole_.fit));
     values_ = whole_.fit;
     if (rows.owner != nullptr) {
@@ -56,7 +53,7 @@ class Finder {
     found_.improved = values_.model.base();
     RoundValues(values_, &found_.improved);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven(covariance));
-    return DescribeSteps(covariance, at_end);
+    return DescribeSteps(covariance);
   }
 
   absl::StatusOr<Quality> QualityOf(const model::Model& model, const Fit& searched, const Fit& final) const {
@@ -78,22 +75,27 @@ class Finder {
     return absl::OkStatus();
   }
 
-  absl::Status DescribeSteps(const Eigen::MatrixXd& covariance, const std::vector<int>& at_end) {
+  absl::StatusOr<int> DescribeSteps(const Eigen::MatrixXd& covariance) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<SelectedStep> selected,
                                 FindCompetitors(search_, whole_, -1, {}));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<OrderedStep> ordered,
-                                OrderSteps(experiment_, whole_, -1, selected, at_end));
-    climbed_.clear();
-    for (const OrderedStep& next : ordered) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const StepOrder order,
+                                OrderSteps(experiment_, whole_, -1, selected, found_.initial,
+                                           [this](const OrderedStep& next, const Quality&) {
+                                             return QualityOf(ModelWith(next), next.fit,
+                                                              next.whole ? values_ : next.fit);
+                                           }));
+    for (const OrderedStep& next : order.steps) {
       LadderStep step = DescribeStep(values_, covariance, *next.step);
       AddConfounded(step, &found_.confounded);
-      const Fit& final = next.whole ? values_ : next.fit;
-      step.model = next.whole ? found_.improved : final.model.base();
-      TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOf(step.model, next.fit, final));
-      climbed_.push_back(next.step->effect);
+      step.model = ModelWith(next);
+      step.quality = next.quality;
       found_.steps.push_back(std::move(step));
     }
-    return absl::OkStatus();
+    return order.without_gain;
+  }
+
+  const model::Model& ModelWith(const OrderedStep& step) const {
+    return step.whole ? found_.improved : step.fit.model.base();
   }
 
   absl::Status Rank() {
@@ -130,7 +132,6 @@ class Finder {
   const StepwiseSearch search_;
   Explanation whole_;
   Fit values_;
-  std::vector<int> climbed_;  // the effect of each step
   bool values_wrong_ = false;
   Findings found_;
 };

@@ -16,14 +16,6 @@ constexpr double kZero = 1e-6;          // ... or this share of the typical size
 constexpr double kDoubted = 0.5;        // probability of a step that explains nothing of what is left
 constexpr double kMaxBesideRest = 0.9;  // ... of one that explains all but a trace
 
-// The model with only those of its further effects that are in `kept`.
-Parameterization Only(const Parameterization& model, int initial_effects, const std::vector<int>& kept) {
-  Parameterization part = model;
-  for (int index = static_cast<int>(model.base().effects.size()) - 1; index >= initial_effects; --index)
-    if (std::find(kept.begin(), kept.end(), index) == kept.end()) part = part.Without(index);
-  return part;
-}
-
 bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& estimates) {
   for (const ParameterEstimate& e : estimates)
     for (const model::ParameterInfo& parameter : effect.parameters)
@@ -34,75 +26,7 @@ bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& e
   return true;
 }
 
-// Whether a step may come before the others that are open.
-bool IsNext(const SelectedStep& step, const std::vector<const SelectedStep*>& open,
-            const std::vector<int>& at_end) {
-  const auto place = [&](const SelectedStep& of) {
-    const auto found = std::find(at_end.begin(), at_end.end(), of.effect);
-    return found == at_end.end() ? -1 : found - at_end.begin();
-  };
-  return std::all_of(open.begin(), open.end(),
-                     [&](const SelectedStep* other) { return place(step) <= place(*other); });
-}
-
 }  // namespace
-
-absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment, const Explanation& whole,
-                                                    int nameless, const std::vector<SelectedStep>& steps,
-                                                    const std::vector<int>& at_end) {
-  std::vector<OrderedStep> ordered;
-  std::vector<const SelectedStep*> open;
-  for (const SelectedStep& step : steps) open.push_back(&step);
-  std::vector<int> kept;
-  while (!open.empty()) {
-    OrderedStep next;
-    size_t chosen = 0;
-    const bool last = open.size() == 1 && nameless < 0;
-    for (size_t j = 0; j < open.size(); ++j) {
-      if (!IsNext(*open[j], open, at_end)) continue;
-      std::vector<int> with = kept;
-      with.push_back(open[j]->effect);
-      absl::StatusOr<Fit> trial =
-          last ? whole.fit : FitModel(experiment, Only(whole.fit.model, whole.initial_effects, with));
-      TOUCHSTONE_RETURN_IF_ERROR(trial.status());
-      if (next.step != nullptr && trial->log_evidence <= next.fit.log_evidence) continue;
-      next = {open[j], *std::move(trial), last};
-      chosen = j;
-    }
-    kept.push_back(next.step->effect);
-    open.erase(open.begin() + static_cast<long>(chosen));
-    ordered.push_back(std::move(next));
-  }
-  return ordered;
-}
-
-int StepWithoutGain(const Quality& before, const std::vector<Quality>& after) {
-  const Quality* last = &before;
-  for (size_t j = 0; j < after.size(); ++j) {
-    if (!(after[j].rmse < last->rmse && after[j].heldout_rmse < last->heldout_rmse))
-      return static_cast<int>(j);
-    last = &after[j];
-  }
-  return -1;
-}
-
-bool StepsAtEnd::MoveToEnd(int effect, const std::vector<int>& climbed) {
-  if (climbed.back() == effect || std::find(effects_.begin(), effects_.end(), effect) != effects_.end())
-    return false;
-  effects_.push_back(effect);
-  return true;
-}
-
-void StepsAtEnd::TakeOut(int effect) {
-  effects_.erase(std::remove(effects_.begin(), effects_.end(), effect), effects_.end());
-  for (int& other : effects_) other -= other > effect;
-}
-
-std::vector<Quality> QualitiesOf(const std::vector<LadderStep>& steps) {
-  std::vector<Quality> qualities;
-  for (const LadderStep& step : steps) qualities.push_back(step.quality);
-  return qualities;
-}
 
 LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from) {
   const model::EffectInstance& instance = values.model.base().effects[from.effect];

@@ -1,5 +1,4 @@
-// From an explanation to its description: the steps in the order in which they explain most, values of the given model that
-// changed, how far a step is to be trusted beside a rest.
+// From an explanation to its description: what the steps say, values of the given model that changed, how far a step is to be trusted beside a rest.
 #pragma once
 
 #include <string>
@@ -11,40 +10,6 @@
 #include "server/diagnosis/engine/result.h"
 
 namespace touchstone::diagnosis::engine {
-
-// A step, and the fit with it and all earlier ones.
-struct OrderedStep {
-  const SelectedStep* step = nullptr;
-  Fit fit;
-  bool whole = false;  // the fit is the whole explanation
-};
-
-// Each step is fitted with those before it; the last one's fit is the whole explanation, unless that holds an effect without
-// a name (index `nameless`; -1: none). Effects in `at_end` come after all others, in that order. `steps` must outlive the
-// result. Errors as FitModel.
-absl::StatusOr<std::vector<OrderedStep>> OrderSteps(const Experiment& experiment, const Explanation& whole,
-                                                    int nameless, const std::vector<SelectedStep>& steps,
-                                                    const std::vector<int>& at_end);
-
-// The first step with which the error of the fit, or on parts that it did not see, does not fall: no step; -1: each is
-// one. `before`: of the given model; `after`: of the model with each step and all earlier ones.
-int StepWithoutGain(const Quality& before, const std::vector<Quality>& after);
-// Which effects come last in the order of steps. A step with which the error does not fall may need one that comes after it:
-// before it is taken out it is tried at the end, on top of all others.
-class StepsAtEnd {
- public:
-  const std::vector<int>& effects() const { return effects_; }
-  // Whether `effect`, without gain in the order `climbed`, has a place at the end yet to be tried. Then it gets it.
-  bool MoveToEnd(int effect, const std::vector<int>& climbed);
-  // The effect has left the model: those behind it move up.
-  void TakeOut(int effect);
-
- private:
-  std::vector<int> effects_;
-};
-
-// The qualities of steps.
-std::vector<Quality> QualitiesOf(const std::vector<LadderStep>& steps);
 
 // Everything but the error and the model. `values`: the fit that its values are taken from, of the same effects as the one
 // that was selected.

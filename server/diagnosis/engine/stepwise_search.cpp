@@ -102,12 +102,12 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, con
   return best;
 }
 
-absl::StatusOr<std::optional<StepwiseSearch::Tried>> StepwiseSearch::BestExtension(
+absl::StatusOr<std::vector<StepwiseSearch::Tried>> StepwiseSearch::LikelyExtensions(
     const Fit& from, int initial_effects) const {
   TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions, Score(from, initial_effects));
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
-  std::optional<Tried> best;
+  std::vector<Tried> likely;
   int fitted = 0, fitted_rare = 0;
   size_t rare = 0;
   for (const Extension& extension : extensions) rare += extension.rare;
@@ -122,29 +122,34 @@ absl::StatusOr<std::optional<StepwiseSearch::Tried>> StepwiseSearch::BestExtensi
     progress_(absl::StrCat("fitting ", InWords(extension)));
     (extension.rare ? fitted_rare : fitted) += near;
     TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitExtension(extension, &from));
-    if (best && fit.log_evidence <= best->fit.log_evidence) continue;
-    best = {std::move(fit), extension.rare ? rare : extensions.size() - rare, extension.rare};
+    Tried tried = {std::move(fit), extension.rare ? rare : extensions.size() - rare, extension.rare};
+    if (IsLikely(from, tried)) likely.push_back(std::move(tried));
   }
-  return best;
+  std::stable_sort(likely.begin(), likely.end(),
+                   [](const Tried& a, const Tried& b) { return a.fit.log_evidence > b.fit.log_evidence; });
+  return likely;
 }
 
 absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
   Fit trial = explanation->fit;
   bool rare = false;
   for (int step = 0; step <= rules_.max_trial_steps; ++step) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<Tried> best,
-                                BestExtension(trial, explanation->initial_effects));
-    if (!best || !IsLikely(trial, *best)) return false;
-    trial = std::move(best->fit);
-    rare |= best->rare;
-    TOUCHSTONE_ASSIGN_OR_RETURN(bool falls, FallsHeldOut(explanation->fit, trial, rare));
-    if (step > 0)
-      falls &=
-          std::pow(HeldOutRmseByBlock(experiment_, trial), 2) <
-          (1 - rules_.min_trial_cv_gain) * std::pow(HeldOutRmseByBlock(experiment_, explanation->fit), 2);
-    if (!falls) continue;
-    explanation->fit = std::move(trial);
-    return true;
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Tried> likely,
+                                LikelyExtensions(trial, explanation->initial_effects));
+    if (likely.empty()) return false;
+    // The best may stand in for what is missing and fail where it was not fitted; the next need not.
+    for (Tried& tried : likely) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(bool falls, FallsHeldOut(explanation->fit, tried.fit, rare || tried.rare));
+      if (step > 0)
+        falls &=
+            std::pow(HeldOutRmseByBlock(experiment_, tried.fit), 2) <
+            (1 - rules_.min_trial_cv_gain) * std::pow(HeldOutRmseByBlock(experiment_, explanation->fit), 2);
+      if (!falls) continue;
+      explanation->fit = std::move(tried.fit);
+      return true;
+    }
+    trial = std::move(likely[0].fit);
+    rare |= likely[0].rare;
   }
   return false;
 }

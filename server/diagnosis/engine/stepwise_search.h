@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +28,7 @@ struct SearchRules {
   double equivalent_nats = 3;           // explanations as near as this are named together
   double complexity_penalty_nats = 11;  // of a formula term that was picked from a dictionary
   int min_rows_per_parameter = 8;       // that each fitted value needs
-  int max_steps = 6;
+  int max_steps = 12;  // additions: a set of six causes may let in others on the way, which leave again
   // Steps that are taken on trial beyond one with which the held-out error does not fall, where what else is missing hides
   // its gain: all of them are steps if its square falls by such a share with the last.
   int max_trial_steps = 0;
@@ -113,13 +112,14 @@ class StepwiseSearch {
   absl::StatusOr<bool> RemoveStep(Explanation* explanation) const;
   absl::StatusOr<bool> SwapStep(Explanation* explanation) const;
   absl::Status Improve(Explanation* explanation) const;  // swaps and removals, as long as there are any
-  // The extension of the fit that is best of those that are likely; `tried`: how many it was chosen from.
+  // An extension that was fitted; `tried`: how many it was chosen from.
   struct Tried {
     Fit fit;
     size_t tried = 0;
     bool rare = false;
   };
-  absl::StatusOr<std::optional<Tried>> BestExtension(const Fit& fit, int initial_effects) const;
+  // Those that gain enough by the likelihood, best first.
+  absl::StatusOr<std::vector<Tried>> LikelyExtensions(const Fit& fit, int initial_effects) const;
   // Whether it gains enough by the likelihood.
   bool IsLikely(const Fit& before, const Tried& after) const;
   // Whether rows that it did not see agree.

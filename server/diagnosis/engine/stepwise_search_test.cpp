@@ -54,6 +54,16 @@ TEST_F(StepwiseSearchTest, AddsTheEffectThatTheRowsFollow) {
   EXPECT_NEAR(explanation.fit.point[0], kSearchPushM, 4 * std::sqrt(explanation.fit.covariance(0, 0)));
 }
 
+// What happened to one group looks most like a push, which the others contradict.
+TEST_F(StepwiseSearchTest, AddsTheNextWhereTheBestFailsOnRowsThatItDidNotSee) {
+  rows.measured += kSearchPushM * rows.columns["oblique_slip"];
+  rows.measured.segment(0, 50) += 6 * kSearchPushM * rows.columns["object_push"].segment(0, 50);
+  const StepwiseSearch search = Search();
+  const std::vector<Extension> extensions = *search.Score(*FitModel(experiment, Nominal()), 0);
+  ASSERT_GT(extensions[0].log_evidence, extensions[1].log_evidence);
+  EXPECT_EQ(Names(search.Run(Nominal(), 0)->fit), std::vector<std::string>{"oblique_slip"});
+}
+
 TEST_F(StepwiseSearchTest, RemovesAnEffectThatTwoOthersMakeSuperfluous) {
   // The third column looks like the sum of the first two, which are the causes.
   rows.columns["gravity_sag"] =

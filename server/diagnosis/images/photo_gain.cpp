@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/step_order.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_search.h"
@@ -132,53 +132,66 @@ class LargeSteps {
   PhotoSelection& selection_;
 };
 
-// The fits on the way to the whole explanation, which is its polished fit, with their errors: up to the first without gain,
-// whose effect is `idle` (-1: every step has one). What lies beyond is not fitted without its parts, which takes longest.
-struct Rungs {
-  std::vector<PhotoRung> rungs;
-  std::vector<int> order;  // all effects
-  int idle = -1;
-};
+// The fits on the way to the whole explanation, which is its polished fit, with their errors.
+class Rungs {
+ public:
+  Rungs(const Photographs& photographs, const DiagnosisContext& context, const PhotoSelection& selection)
+      : photographs_(photographs),
+        context_(context),
+        selection_(selection),
+        experiment_(*selection.fine.experiment) {}
 
-absl::StatusOr<Rungs> RungsOf(const Photographs& photographs, const DiagnosisContext& context,
-                              const PhotoSelection& selection, const std::vector<int>& at_end) {
-  const engine::Experiment& experiment = *selection.fine.experiment;
-  std::vector<engine::SelectedStep> steps;
-  for (int e = selection.initial_effects; e < static_cast<int>(selection.fit.model.base().effects.size());
-       ++e)
-    if (e != selection.field) steps.emplace_back().effect = e;
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<engine::OrderedStep> ordered,
-                              engine::OrderSteps(experiment, {selection.fit, selection.initial_effects},
-                                                 selection.field, steps, at_end));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const double given,
-                              ErrorOf(photographs, selection.initial.model.base(), context.pool));
-  Rungs made;
-  for (const engine::OrderedStep& step : ordered) made.order.push_back(step.step->effect);
-  std::vector<engine::Quality> after;
-  for (engine::OrderedStep& step : ordered) {
-    const engine::Fit alone = step.fit;
-    PhotoRung rung{step.step->effect, std::move(step.fit)};
-    if (made.rungs.size() + 1 == ordered.size()) {
-      // What is saved: the values of the whole explanation, without what has no name.
-      rung.fit = selection.polished;
-      if (selection.field >= 0) rung.fit.model = rung.fit.model.Without(selection.field);
+  // Returns engine::StepOrder::without_gain; with -1 the rungs.
+  absl::StatusOr<int> Make(std::vector<PhotoRung>* rungs) const {
+    std::vector<engine::SelectedStep> steps;
+    for (int e = selection_.initial_effects; e < static_cast<int>(selection_.fit.model.base().effects.size());
+         ++e)
+      if (e != selection_.field) steps.emplace_back().effect = e;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double given, ErrorOfAll(selection_.initial));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        engine::StepOrder order,
+        engine::OrderSteps(experiment_, {selection_.fit, selection_.initial_effects}, selection_.field, steps,
+                           {given, given, 0},
+                           [this](const engine::OrderedStep& step, const engine::Quality& last) {
+                             return QualityOf(step, last);
+                           }));
+    for (engine::OrderedStep& step : order.steps) {
+      const double ratio = step.quality.heldout_rmse / step.quality.rmse;
+      rungs->push_back({step.step->effect, ShownFit(step), step.quality.rmse, ratio});
     }
-    TOUCHSTONE_ASSIGN_OR_RETURN(rung.rmse, ErrorOf(photographs, rung.fit.model.base(), context.pool));
-    const auto is_idle = [&](double heldout_rmse) {
-      after.back().heldout_rmse = heldout_rmse;
-      return engine::StepWithoutGain({given, given, 0}, after) >= 0;
-    };
-    made.idle = rung.effect;
-    after.push_back({rung.rmse, 0, 0});
-    if (is_idle(0)) return made;  // whatever unseen pictures say
-    TOUCHSTONE_ASSIGN_OR_RETURN(rung.heldout_ratio,
-                                HeldOutRatio(photographs, *selection.fine.rows, experiment, alone));
-    if (is_idle(rung.rmse * rung.heldout_ratio)) return made;
-    made.rungs.push_back(std::move(rung));
-    made.idle = -1;
+    return order.without_gain;
   }
-  return made;
-}
+
+ private:
+  absl::StatusOr<double> ErrorOfAll(const engine::Fit& fit) const {
+    return ErrorOf(photographs_, fit.model.base(), context_.pool);
+  }
+
+  // Of the last, what is saved: the values of the whole explanation, without what has no name.
+  engine::Fit ShownFit(const engine::OrderedStep& step) const {
+    if (!step.last) return step.fit;
+    engine::Fit fit = selection_.polished;
+    if (selection_.field >= 0) fit.model = fit.model.Without(selection_.field);
+    return fit;
+  }
+
+  // The error on unseen pictures takes longest.
+  absl::StatusOr<engine::Quality> QualityOf(const engine::OrderedStep& step,
+                                            const engine::Quality& last) const {
+    engine::Quality quality = {0, INFINITY, 0};
+    TOUCHSTONE_ASSIGN_OR_RETURN(quality.rmse, ErrorOfAll(ShownFit(step)));
+    if (quality.rmse >= last.rmse) return quality;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const double ratio,
+                                HeldOutRatio(photographs_, *selection_.fine.rows, experiment_, step.fit));
+    quality.heldout_rmse = quality.rmse * ratio;
+    return quality;
+  }
+
+  const Photographs& photographs_;
+  const DiagnosisContext& context_;
+  const PhotoSelection& selection_;
+  const engine::Experiment& experiment_;
+};
 
 }  // namespace
 
@@ -215,13 +228,11 @@ absl::Status HoldChoices(PhotoSelection* selection) {
 absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection) {
   TOUCHSTONE_RETURN_IF_ERROR(PolishExplanation(photographs, context, selection));
-  for (engine::StepsAtEnd at_end;;) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Rungs made, RungsOf(photographs, context, *selection, at_end.effects()));
-    selection->rungs = std::move(made.rungs);
-    const int effect = made.idle;
+  for (;;) {
+    selection->rungs.clear();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const int effect,
+                                Rungs(photographs, context, *selection).Make(&selection->rungs));
     if (effect < 0) return absl::OkStatus();
-    if (at_end.MoveToEnd(effect, made.order)) continue;
-    at_end.TakeOut(effect);
     TOUCHSTONE_ASSIGN_OR_RETURN(
         selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(effect)));
     if (selection->field > effect) --selection->field;

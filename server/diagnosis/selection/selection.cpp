@@ -22,6 +22,8 @@ namespace {
 constexpr int kTermsFitted = 3;
 constexpr int kMaxFormulaTerms = 2;
 constexpr int kPasses = 3;
+constexpr double kAsGoodNats =
+    0.5;  // behind a fit that was extended, one that was searched anew is preferred
 
 std::string FormulaName(const FormulaTerm& term) {
   std::string name = "rest_" + term.covariate;
@@ -86,13 +88,22 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::Step
 
 // Effects of the catalogue first; what they leave may follow a formula; with the formula in place some of the
 // effects may turn out to have stood in for it.
-absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
+// `before`: what was found with other touches, or other weights; it goes on from there too.
+absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::Parameterization>& before,
+                        SelectionResult* result) {
   const engine::StepwiseSearch& search = *result->search;
   const int initial_effects = static_cast<int>(workspace.input.model->effects.size());
   result->initial_effects = initial_effects;
   engine::Parameterization base(*workspace.input.model, workspace.searched->objects);
   TOUCHSTONE_ASSIGN_OR_RETURN(result->initial_model, engine::FitModel(workspace.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation best, search.Run(base, initial_effects));
+  if (before) {
+    engine::Explanation known;
+    known.initial_effects = initial_effects;
+    known.fit.model = *before;
+    TOUCHSTONE_ASSIGN_OR_RETURN(known, search.Continue(std::move(known)));
+    if (known.fit.log_evidence > best.fit.log_evidence + kAsGoodNats) best = std::move(known);
+  }
   result->formula = -1;
   FormulaTerm* first = nullptr;
   for (int terms = 0; terms < kMaxFormulaTerms; ++terms) {
@@ -104,15 +115,12 @@ absl::Status FindCauses(const Workspace& workspace, SelectionResult* result) {
     engine::Parameterization start = base;
     start.Add(*effect, false);
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation again, search.Run(start, initial_effects));
-    const int at = FindFormula(again.fit, initial_effects, FormulaName(with.term));
-    if (at >= 0 && again.fit.log_evidence > with.explanation.fit.log_evidence - 0.5) {
-      best = std::move(again);
-    } else {
-      best = std::move(with.explanation);
-    }
-    result->term = with.term;
+    // It may have led the search to effects that do without it.
+    const bool better = again.fit.log_evidence > with.explanation.fit.log_evidence - kAsGoodNats;
+    best = std::move(better ? again : with.explanation);
     result->formula = FindFormula(best.fit, initial_effects, FormulaName(with.term));
-    first = &result->term;
+    result->term = with.term;
+    first = result->formula < 0 ? nullptr : &result->term;
   }
   result->fit = best.fit;
   result->without_formula = best.fit;
@@ -204,6 +212,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   };
   engine::NothingMissing nothing_missing;
   std::optional<GroupDifference> group;
+  std::optional<engine::Parameterization> before;
   for (int pass = 0; pass < kPasses; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
     result = SelectionResult();
@@ -215,7 +224,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
       TOUCHSTONE_ASSIGN_OR_RETURN(columns, ColumnsOfEffects(*workspace, *result.search));
       TOUCHSTONE_ASSIGN_OR_RETURN(nothing_missing, TestNothingMissing(*workspace, columns));
     }
-    TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, &result));
+    TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, before, &result));
     if (pass == 0) {
       TOUCHSTONE_ASSIGN_OR_RETURN(group, FindGroupDifference(*workspace, columns, result));
       if (group) {
@@ -228,6 +237,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised,
                                 ReviseTouches(result.fit, result.noise, workspace, &weights));
     if (!revised) break;
+    before = result.without_formula.model;
   }
   result.nothing_missing = nothing_missing;
   result.group = std::move(group);

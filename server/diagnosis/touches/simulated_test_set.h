@@ -21,6 +21,7 @@ struct HiddenRig {
   std::vector<std::string> objects = {"lat00", "lat10", "lat20"};
   int samples_per_face = 4;
   int rounds = 3;
+  std::vector<double> speeds_mm_s;  // of one round after the other; empty: the plan's
   double sigma_us = 2000;
   // Effects of the rig that the model lacks: {"tip_radius", "radius_mm=1.5"}.
   std::vector<std::pair<std::string, std::vector<std::string>>> hidden;
@@ -74,7 +75,9 @@ inline DiagnosisInput MakeTestInput(const HiddenRig& rig) {
         plan, surface->bounds(), (rig.pose_seed != 0 ? rig.pose_seed : rig.seed) + 17 * object);
     touch::TouchWorkspace workspace;
     for (uint64_t number = 0; number < generator->Count(); ++number) {
-      const touch::CommandedTouch touch = touch::TouchOfPlan(plan, *generator, number, 0);
+      touch::CommandedTouch touch = touch::TouchOfPlan(plan, *generator, number, 0);
+      const uint64_t round = number * rig.rounds / generator->Count();
+      if (!rig.speeds_mm_s.empty()) touch.speed_m_s = 1e-3 * rig.speeds_mm_s[round % rig.speeds_mm_s.size()];
       const auto fill = [&] {
         simulator.Prepare(1, &batch);
         batch.surface = surface;

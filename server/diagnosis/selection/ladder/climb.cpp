@@ -2,6 +2,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/step_order.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/session/dropouts.h"
 #include "server/diagnosis/selection/session/session_order.h"
@@ -20,19 +21,17 @@ std::vector<engine::SelectedStep> StepsWithoutFormula(const SelectionResult& sel
 
 class Climber {
  public:
-  Climber(const Workspace& workspace, const SelectionResult& selection, const std::vector<int>& at_end)
-      : workspace_(workspace), selection_(selection), at_end_(at_end), ladder_(climb_.ladder) {
+  Climber(const Workspace& workspace, const SelectionResult& selection)
+      : workspace_(workspace), selection_(selection), ladder_(climb_.ladder) {
     climb_.searched = has_formula() ? &selection.without_formula : &selection.fit;
     climb_.steps = StepsWithoutFormula(selection);
   }
 
   absl::StatusOr<Climb> Run() {
     TOUCHSTONE_RETURN_IF_ERROR(Improve());
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     TOUCHSTONE_ASSIGN_OR_RETURN(
         climb_.before, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
-    const int step = engine::StepWithoutGain(climb_.before, engine::QualitiesOf(ladder_.steps));
-    if (step >= 0) climb_.without_gain = climb_.order[step];
+    TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     return std::move(climb_);
   }
 
@@ -86,22 +85,28 @@ class Climber {
 
   absl::Status DescribeSteps() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
-        const std::vector<engine::OrderedStep> ordered,
+        const engine::StepOrder order,
         engine::OrderSteps(workspace_.experiment, {*climb_.searched, selection_.initial_effects}, -1,
-                           climb_.steps, at_end_));
-    for (const engine::OrderedStep& step : ordered) TOUCHSTONE_RETURN_IF_ERROR(DescribeStep(step));
+                           climb_.steps, climb_.before,
+                           [this](const engine::OrderedStep& step, const engine::Quality&) {
+                             return QualityOfModel(workspace_, step.fit, ModelWith(step));
+                           }));
+    climb_.without_gain = order.without_gain;
+    for (const engine::OrderedStep& step : order.steps) AddStep(step);
     return absl::OkStatus();
   }
 
-  absl::Status DescribeStep(const engine::OrderedStep& ordered) {
+  const model::Model& ModelWith(const engine::OrderedStep& step) const {
+    return step.whole ? ladder_.improved : step.fit.model.base();
+  }
+
+  void AddStep(const engine::OrderedStep& ordered) {
     engine::LadderStep step = engine::DescribeStep(climb_.fit, climb_.fit.covariance, *ordered.step);
     engine::AddConfounded(step, &ladder_.confounded);
     AddOrder(ordered.step->effect, &step);
-    step.model = ordered.whole ? ladder_.improved : ordered.fit.model.base();
-    TOUCHSTONE_ASSIGN_OR_RETURN(step.quality, QualityOfModel(workspace_, ordered.fit, step.model));
-    climb_.order.push_back(ordered.step->effect);
+    step.model = ModelWith(ordered);
+    step.quality = ordered.quality;
     ladder_.steps.push_back(std::move(step));
-    return absl::OkStatus();
   }
 
   // Objects have sizes and places of their own; what belongs to the rig and differs between objects may differ in time.
@@ -115,7 +120,6 @@ class Climber {
 
   const Workspace& workspace_;
   const SelectionResult& selection_;
-  const std::vector<int>& at_end_;
   Climb climb_;
   Ladder& ladder_;  // the climb's
 };
@@ -138,9 +142,8 @@ absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit
   return whole;
 }
 
-absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection,
-                                 const std::vector<int>& at_end) {
-  return Climber(workspace, selection, at_end).Run();
+absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection) {
+  return Climber(workspace, selection).Run();
 }
 
 }  // namespace touchstone::diagnosis::selection

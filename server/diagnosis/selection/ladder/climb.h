@@ -16,14 +16,11 @@ struct Climb {
   engine::Quality before;  // of the model as it was given
   // Improved model, steps with errors, refits, residuals, noise floor, dropouts.
   Ladder ladder;
-  std::vector<int> order;  // the effect of each of the ladder's steps, by its index in these fits
-  int without_gain =
-      -1;  // the first of these with which the error does not fall (engine::StepWithoutGain); -1: none
+  int without_gain = -1;  // engine::StepOrder's, by its index in these fits
 };
 
-// `selection` must outlive the result; `at_end`: as in engine::OrderSteps, by the indices of Climb::order.
-absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection,
-                                 const std::vector<int>& at_end);
+// `selection` must outlive the result.
+absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResult& selection);
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
 absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit,

@@ -312,12 +312,10 @@ class LadderBuilder {
 }  // namespace
 
 absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* selection) {
-  for (engine::StepsAtEnd at_end;;) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(Climb climb, ClimbSteps(workspace, *selection, at_end.effects()));
+  for (;;) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(Climb climb, ClimbSteps(workspace, *selection));
     const int effect = climb.without_gain;
     if (effect < 0) return LadderBuilder(workspace, *selection, std::move(climb)).Build();
-    if (at_end.MoveToEnd(effect, climb.order)) continue;
-    at_end.TakeOut(effect);
     // The selection's own index counts the formula's effect.
     const bool behind_formula = selection->formula >= 0 && effect >= selection->formula;
     TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, effect + behind_formula, selection));

@@ -1,0 +1,74 @@
+// Sets in which many effects are missing at once, of which some show only beside others.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/test_tier.h"
+#include "server/diagnosis/selection/ladder/ladder.h"
+#include "server/diagnosis/selection/simulated_test_search.h"
+
+namespace touchstone::diagnosis::selection {
+namespace {
+
+using ::testing::UnorderedElementsAreArray;
+
+// The step's effect, or the one of those that the data cannot tell from it that was hidden.
+std::string NameAmong(const std::vector<std::string>& hidden, const engine::LadderStep& step) {
+  for (const std::string& name : step.equivalent)
+    if (std::find(hidden.begin(), hidden.end(), name) != hidden.end()) return name;
+  return step.effect;
+}
+
+// Every hidden effect is a step, nothing else is, and the error falls with each.
+void ExpectAllFound(const touches::HiddenRig& rig) {
+  Selected selected = SelectFor(touches::MakeTestInput(rig));
+  const auto ladder = BuildLadder(*selected.workspace, &selected.result);
+  ASSERT_TRUE(ladder.ok()) << ladder.status();
+  EXPECT_EQ(ladder->verdict, engine::Verdict::kMissingEffects);
+  std::vector<std::string> hidden, found;
+  for (const auto& [effect, values] : rig.hidden) hidden.push_back(effect);
+  double last = INFINITY;
+  for (const engine::LadderStep& step : ladder->steps) {
+    found.push_back(NameAmong(hidden, step));
+    EXPECT_LT(step.quality.rmse, last) << step.effect;
+    last = step.quality.rmse;
+  }
+  EXPECT_THAT(found, UnorderedElementsAreArray(hidden));
+}
+
+// A size that is 2.6 % off makes up for fingers that stand too close and a speed that is too low: either of these, beside it,
+// leaves the error as it is.
+TEST(SeveralEffects, StepsThatNeedEachOtherAreBothFound) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  rig.rounds = 2;
+  rig.hidden = {{"finger_spacing", {"delta_mm=-0.65"}},
+                {"finger_length", {"offset_mm=-0.245,0.202,0.043"}},
+                {"object_scale", {"relative=0.0163"}},
+                {"tip_radius", {"radius_mm=1.84"}},
+                {"speed_error", {"relative=-0.0229"}}};
+  ExpectAllFound(rig);
+}
+
+// A suggested formula may stand for what the search had not reached yet; with the effects in place it is not needed.
+TEST(SeveralEffects, SixEffectsAtTwoSpeedsNeedNoFormula) {
+  TOUCHSTONE_SECOND_TIER("long: a search for six effects");
+  touches::HiddenRig rig;
+  rig.objects = {"lat00", "lat05", "lat15", "lat20"};
+  rig.samples_per_face = 4;
+  rig.rounds = 4;
+  rig.speeds_mm_s = {10, 30};
+  rig.sigma_us = 3000;
+  rig.hidden = {{"finger_spacing", {"delta_mm=-1.04"}},
+                {"finger_length", {"offset_mm=-0.093,-0.1335,0.2265"}},
+                {"speed_error", {"relative=-0.0387"}},
+                {"channel_latency", {"latency_us=-5270,1429,3841"}},
+                {"thermal_drift", {"rate_mm_per_h=-0.1234,0.0178,0.1056"}},
+                {"return_hysteresis", {"fraction=0.1747"}}};
+  ExpectAllFound(rig);
+}
+
+}  // namespace
+}  // namespace touchstone::diagnosis::selection
