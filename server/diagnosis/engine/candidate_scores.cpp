@@ -58,23 +58,75 @@ class Scorer {
     TOUCHSTONE_RETURN_IF_ERROR(Differentiate());
     columns_ = Likelihood::Join(fit_.columns, experiment_.likelihood->Prepare(wide_));
     inner_ = experiment_.likelihood->InnerByGroup(columns_);
-    // Under two hypotheses first: bumps or none change little of the order.
-    std::vector<int> all(experiment_.likelihood->hypotheses().size()), few = {0};
-    std::iota(all.begin(), all.end(), 0);
-    if (fit_.hypothesis != 0) few.push_back(fit_.hypothesis);
     std::vector<int> screened, exact;
     for (int m = 0; m < static_cast<int>(extensions_.size()); ++m)
       (SharesColumns(extensions_[m]) ? screened : exact).push_back(m);
-    Evaluate(screened, few);
+    EvaluateEach(screened, Few());
     std::sort(screened.begin(), screened.end(),
               [&](int a, int b) { return extensions_[a].log_evidence > extensions_[b].log_evidence; });
     if (screened.size() > kMaxExactOnOne) screened.resize(kMaxExactOnOne);
     exact.insert(exact.end(), screened.begin(), screened.end());
-    Evaluate(exact, all);
+    EvaluateEach(exact, All());
     return absl::OkStatus();
   }
 
+  // After Run.
+  std::vector<PairOfExtensions> Pairs() const {
+    std::vector<PairOfExtensions> pairs;
+    std::vector<Sized> sized;
+    for (int a = 0; a < static_cast<int>(extensions_.size()); ++a)
+      for (int b = a + 1; b < static_cast<int>(extensions_.size()); ++b) {
+        if (!ActsOnAll(extensions_[a]) || !ActsOnAll(extensions_[b])) continue;
+        if (extensions_[a].name == extensions_[b].name) continue;
+        pairs.push_back({a, b});
+        sized.push_back(Join(a, b));
+      }
+    const std::vector<double> log_evidence = Evaluate(sized, Few());
+    for (size_t at = 0; at < pairs.size(); ++at) pairs[at].log_evidence = log_evidence[at];
+    std::stable_sort(pairs.begin(), pairs.end(), [](const PairOfExtensions& a, const PairOfExtensions& b) {
+      return a.log_evidence > b.log_evidence;
+    });
+    return pairs;
+  }
+
  private:
+  // Columns with the parameters that they belong to.
+  struct Sized {
+    std::vector<ScoringGram::Member> members;
+    std::vector<FreeParameter> parameters;
+    Eigen::VectorXd point;
+  };
+
+  // Two hypotheses: bumps or none change little of an order.
+  std::vector<int> Few() const {
+    return fit_.hypothesis == 0 ? std::vector<int>{0} : std::vector<int>{0, fit_.hypothesis};
+  }
+  std::vector<int> All() const {
+    std::vector<int> all(experiment_.likelihood->hypotheses().size());
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
+
+  static bool ActsOnAll(const Extension& extension) {
+    return extension.visible && !extension.rare && extension.object.empty();
+  }
+
+  Sized Alone(int extension) const {
+    const Parameterization& start = extensions_[extension].start;
+    return {MembersOf(extensions_[extension], first_column_[extension]), start.parameters(), start.Start()};
+  }
+  // What the second has beyond the fit stands behind the first.
+  Sized Join(int first, int second) const {
+    Sized both = Alone(first);
+    const Sized other = Alone(second);
+    both.members.insert(both.members.end(), other.members.begin() + 1 + own_, other.members.end());
+    both.parameters.insert(both.parameters.end(), other.parameters.begin() + own_, other.parameters.end());
+    Eigen::VectorXd point(both.point.size() + other.point.size() - own_);
+    point << both.point, other.point.tail(other.point.size() - own_);
+    both.point = std::move(point);
+    return both;
+  }
+
   // Whether the columns are those of the same effect on all objects, object by object.
   bool SharesColumns(const Extension& extension) const {
     return extension.candidate >= 0 && extension.start.size() > own_ &&
@@ -136,31 +188,37 @@ class Scorer {
     return visible;
   }
 
-  // The evidence of these extensions, averaged over the hypotheses.
-  void Evaluate(const std::vector<int>& which, const std::vector<int>& hypotheses) {
+  void EvaluateEach(const std::vector<int>& which, const std::vector<int>& hypotheses) {
+    std::vector<Sized> sized;
+    for (const int m : which) sized.push_back(Alone(m));
+    const std::vector<double> log_evidence = Evaluate(sized, hypotheses);
+    for (size_t at = 0; at < which.size(); ++at) extensions_[which[at]].log_evidence = log_evidence[at];
+  }
+
+  // The evidence of each, averaged over the hypotheses.
+  std::vector<double> Evaluate(const std::vector<Sized>& sized, const std::vector<int>& hypotheses) const {
     const Likelihood& likelihood = *experiment_.likelihood;
-    std::vector<std::vector<ScoringGram::Member>> members;
-    for (const int m : which) members.push_back(MembersOf(extensions_[m], first_column_[m]));
     std::vector<std::vector<Eigen::MatrixXd>> grams(
-        which.size(), std::vector<Eigen::MatrixXd>(likelihood.hypotheses().size()));
+        sized.size(), std::vector<Eigen::MatrixXd>(likelihood.hypotheses().size()));
     const auto gram = [&](int begin, int end) {
       for (int h = begin; h < end; ++h) {
         const ScoringGram all(likelihood.GramByGroup(columns_, inner_, hypotheses[h]));
-        for (size_t at = 0; at < which.size(); ++at) grams[at][hypotheses[h]] = all.Of(members[at]);
+        for (size_t at = 0; at < sized.size(); ++at) grams[at][hypotheses[h]] = all.Of(sized[at].members);
       }
     };
     ParallelFor(experiment_.pool, static_cast<int>(hypotheses.size()), 4, gram);
+    std::vector<double> log_evidence(sized.size());
     const auto evaluate = [&](int begin, int end) {
       for (int at = begin; at < end; ++at) {
-        Extension& extension = extensions_[which[at]];
-        std::vector<int> in_order(members[at].size());
+        std::vector<int> in_order(sized[at].members.size());
         std::iota(in_order.begin(), in_order.end(), 0);
-        extension.log_evidence = ComputeLaplaceEvidence(likelihood, grams[at], in_order,
-                                                        extension.start.parameters(), extension.start.Start())
-                                     .log_evidence;
+        log_evidence[at] =
+            ComputeLaplaceEvidence(likelihood, grams[at], in_order, sized[at].parameters, sized[at].point)
+                .log_evidence;
       }
     };
-    ParallelFor(experiment_.pool, static_cast<int>(which.size()), 1, evaluate);
+    ParallelFor(experiment_.pool, static_cast<int>(sized.size()), 1, evaluate);
+    return log_evidence;
   }
 
   const Experiment& experiment_;
@@ -175,6 +233,24 @@ class Scorer {
 
 }  // namespace
 
+void StepwiseSearch::Extend(const Extension& extension, Parameterization* model) const {
+  if (extension.candidate < 0) {
+    model->Free(extension.given, true);
+    return;
+  }
+  const Candidate& candidate = candidates_[extension.candidate];
+  if (extension.object.empty())
+    model->Add(candidate.effect, candidate.per_object);
+  else
+    model->AddOn(candidate.effect, extension.object);
+  const std::vector<double>& values = candidate.starts_at;
+  if (values.empty()) return;
+  Eigen::VectorXd point = model->Start();
+  point.tail(static_cast<int>(values.size())) =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
+  model->MoveTo(point);
+}
+
 // What may extend the fit: effects of the model whose values are not free yet, and candidates that it lacks.
 std::vector<Extension> StepwiseSearch::ListExtensions(const Fit& fit, int initial_effects) const {
   std::vector<Extension> extensions;
@@ -186,8 +262,9 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const Fit& fit, int initia
     if (std::find(settled.begin(), settled.end(), own.name) != settled.end()) continue;
     Extension extension;
     extension.name = NameOf(*model.effects[index].effect);
+    extension.given = index;
     extension.start = fit.model;
-    extension.start.Free(index, true);
+    Extend(extension, &extension.start);
     extensions.push_back(std::move(extension));
   }
   for (int c = 0; c < static_cast<int>(candidates_.size()); ++c) {
@@ -203,25 +280,18 @@ std::vector<Extension> StepwiseSearch::ListExtensions(const Fit& fit, int initia
     extension.rare = candidates_[c].rare;
     extension.nameless = candidates_[c].nameless;
     extension.start = fit.model;
-    if (extension.object.empty())
-      extension.start.Add(candidates_[c].effect, candidates_[c].per_object);
-    else
-      extension.start.AddOn(candidates_[c].effect, extension.object);
-    if (!candidates_[c].starts_at.empty()) {
-      Eigen::VectorXd point = extension.start.Start();
-      const std::vector<double>& values = candidates_[c].starts_at;
-      point.tail(static_cast<int>(values.size())) =
-          Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<int>(values.size()));
-      extension.start.MoveTo(point);
-    }
+    Extend(extension, &extension.start);
     extensions.push_back(std::move(extension));
   }
   return extensions;
 }
 
-absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int initial_effects) const {
+absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int initial_effects,
+                                                             std::vector<PairOfExtensions>* pairs) const {
   std::vector<Extension> extensions = ListExtensions(fit, initial_effects);
-  TOUCHSTONE_RETURN_IF_ERROR(Scorer(experiment_, fit, &extensions).Run());
+  Scorer scorer(experiment_, fit, &extensions);
+  TOUCHSTONE_RETURN_IF_ERROR(scorer.Run());
+  if (pairs != nullptr) *pairs = scorer.Pairs();
   return extensions;
 }
 

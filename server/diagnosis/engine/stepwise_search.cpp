@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "server/base/distributions.h"
 #include "server/base/random.h"
@@ -17,6 +18,7 @@ constexpr double kNearPrediction = 40;  // nats: candidates this far behind the 
 constexpr double kPoorPrediction =
     0.5;  // ... or this share of the evidence behind the fit, for strong effects
 constexpr int kFormulaStarts = 8;
+constexpr size_t kMaxPairs = 3;       // that are fitted in full
 constexpr double kNegligible = 1e-3;  // of a held-out part's squares, over the noise's square
 
 std::string InWords(const Extension& extension) {
@@ -103,8 +105,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, con
 }
 
 absl::StatusOr<std::vector<StepwiseSearch::Tried>> StepwiseSearch::LikelyExtensions(
-    const Fit& from, int initial_effects) const {
-  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> extensions, Score(from, initial_effects));
+    const Fit& from, std::vector<Extension> extensions) const {
   std::sort(extensions.begin(), extensions.end(),
             [](const Extension& a, const Extension& b) { return a.log_evidence > b.log_evidence; });
   std::vector<Tried> likely;
@@ -131,12 +132,17 @@ absl::StatusOr<std::vector<StepwiseSearch::Tried>> StepwiseSearch::LikelyExtensi
 }
 
 absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
-  Fit trial = explanation->fit;
+  std::vector<PairOfExtensions> pairs;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<Extension> extensions,
+                              Score(explanation->fit, explanation->initial_effects, &pairs));
+  TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Tried> likely, LikelyExtensions(explanation->fit, extensions));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool one, AddOne(std::move(likely), explanation));
+  return one ? true : AddTwo(extensions, pairs, explanation);
+}
+
+absl::StatusOr<bool> StepwiseSearch::AddOne(std::vector<Tried> likely, Explanation* explanation) const {
   bool rare = false;
-  for (int step = 0; step <= rules_.max_trial_steps; ++step) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Tried> likely,
-                                LikelyExtensions(trial, explanation->initial_effects));
-    if (likely.empty()) return false;
+  for (int step = 0; !likely.empty(); ++step) {
     // The best may stand in for what is missing and fail where it was not fitted; the next need not.
     for (Tried& tried : likely) {
       TOUCHSTONE_ASSIGN_OR_RETURN(bool falls, FallsHeldOut(explanation->fit, tried.fit, rare || tried.rare));
@@ -148,10 +154,34 @@ absl::StatusOr<bool> StepwiseSearch::AddStep(Explanation* explanation) const {
       explanation->fit = std::move(tried.fit);
       return true;
     }
-    trial = std::move(likely[0].fit);
+    if (step == rules_.max_trial_steps) break;
+    const Fit trial = std::move(likely[0].fit);
     rare |= likely[0].rare;
+    TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Extension> next, Score(trial, explanation->initial_effects));
+    TOUCHSTONE_ASSIGN_OR_RETURN(likely, LikelyExtensions(trial, std::move(next)));
   }
   return false;
+}
+
+absl::StatusOr<bool> StepwiseSearch::AddTwo(const std::vector<Extension>& extensions,
+                                            const std::vector<PairOfExtensions>& pairs,
+                                            Explanation* explanation) const {
+  const Fit& from = explanation->fit;
+  std::optional<Tried> best;
+  for (size_t k = 0; k < pairs.size() && k < kMaxPairs; ++k) {
+    if (pairs[k].log_evidence < from.log_evidence + 2 * rules_.enter_nats) break;
+    const Extension& second = extensions[pairs[k].second];
+    progress_(absl::StrCat("fitting ", InWords(extensions[pairs[k].first]), " and ", InWords(second)));
+    Parameterization both = extensions[pairs[k].first].start;
+    Extend(second, &both);
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitModel(experiment_, std::move(both), kMaxIterations, &from));
+    if (!best || fit.log_evidence > best->fit.log_evidence) best = {std::move(fit), pairs.size(), false};
+  }
+  if (!best || best->fit.log_evidence < from.log_evidence + 2 * rules_.enter_nats || !IsLikely(from, *best))
+    return false;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool falls, FallsHeldOut(from, best->fit, false));
+  if (falls) explanation->fit = std::move(best->fit);
+  return falls;
 }
 
 absl::StatusOr<Fit> StepwiseSearch::WithoutEffect(const Explanation& explanation, int index) const {

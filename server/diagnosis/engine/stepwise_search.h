@@ -31,7 +31,7 @@ struct SearchRules {
   int max_steps = 12;  // additions: a set of six causes may let in others on the way, which leave again
   // Steps that are taken on trial beyond one with which the held-out error does not fall, where what else is missing hides
   // its gain: all of them are steps if its square falls by such a share with the last.
-  int max_trial_steps = 0;
+  int max_trial_steps = 3;
   double min_trial_cv_gain = 0.5;
   // Share of what a step gains that the linearised prediction must give to another effect, declared to resemble it, for it
   // to be fitted in the step's place.
@@ -43,6 +43,7 @@ struct SearchRules {
 // One way to extend a fit.
 struct Extension {
   int candidate = -1;       // index into the candidates; -1: sets an effect of the model free
+  int given = -1;           // ... its index in the model
   std::string name;         // of the effect
   std::string object;       // the only one on which it acts; empty: on all
   bool rare = false;        // Candidate::rare
@@ -50,6 +51,12 @@ struct Extension {
   bool visible = false;     // false: this experiment cannot see it
   double log_evidence = 0;  // linearised prediction, nats
   Parameterization start;
+};
+
+// Two extensions at once, of those that act on all objects alike and are visible.
+struct PairOfExtensions {
+  int first = 0, second = 0;  // indices into the extensions; first < second
+  double log_evidence = 0;    // linearised prediction, nats
 };
 
 // One effect in the place of another, fitted.
@@ -88,7 +95,9 @@ class StepwiseSearch {
 
   // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts. Of effects on one
   // object that are far behind, only an estimate (candidate_scores.cpp).
-  absl::StatusOr<std::vector<Extension>> Score(const Fit& fit, int initial_effects) const;
+  // `pairs`, if given: two of them at once, best first.
+  absl::StatusOr<std::vector<Extension>> Score(const Fit& fit, int initial_effects,
+                                               std::vector<PairOfExtensions>* pairs = nullptr) const;
 
   // The fits in which other effects, or other values of the model's own, take the place of effect `index`, best first;
   // the linearised prediction, and what effects declare of one another, choose which are fitted. The first is the fit
@@ -118,8 +127,16 @@ class StepwiseSearch {
     size_t tried = 0;
     bool rare = false;
   };
-  // Those that gain enough by the likelihood, best first.
-  absl::StatusOr<std::vector<Tried>> LikelyExtensions(const Fit& fit, int initial_effects) const;
+  // Those that gain enough by the likelihood, best first. `extensions`: of Score.
+  absl::StatusOr<std::vector<Tried>> LikelyExtensions(const Fit& from,
+                                                      std::vector<Extension> extensions) const;
+  // One that lets the error on rows fall that it did not see, of `likely`, or else of what may follow the best of them.
+  absl::StatusOr<bool> AddOne(std::vector<Tried> likely, Explanation* explanation) const;
+  // Two of which neither explains enough by itself: what one adds, the other takes away where they are fitted to.
+  absl::StatusOr<bool> AddTwo(const std::vector<Extension>& extensions,
+                              const std::vector<PairOfExtensions>& pairs, Explanation* explanation) const;
+  // `model` with what the extension frees or adds, where it changes nothing.
+  void Extend(const Extension& extension, Parameterization* model) const;
   // Whether it gains enough by the likelihood.
   bool IsLikely(const Fit& before, const Tried& after) const;
   // Whether rows that it did not see agree.

@@ -64,6 +64,22 @@ TEST_F(StepwiseSearchTest, AddsTheNextWhereTheBestFailsOnRowsThatItDidNotSee) {
   EXPECT_EQ(Names(search.Run(Nominal(), 0)->fit), std::vector<std::string>{"oblique_slip"});
 }
 
+// One effect takes away what the other adds, but for a twentieth of it.
+TEST_F(StepwiseSearchTest, AddsTwoOfWhichNeitherShowsWithoutTheOther) {
+  rows.columns["oblique_slip"] = rows.Random(20, 0.05 * kSearchColumn) - rows.columns["object_push"];
+  rows.measured += 4 * kSearchPushM * (rows.columns["object_push"] + rows.columns["oblique_slip"]);
+  const StepwiseSearch search = Search();
+  const Fit nominal = *FitModel(experiment, Nominal());
+  std::vector<PairOfExtensions> pairs;
+  for (const Extension& extension : *search.Score(nominal, 0, &pairs))
+    EXPECT_LT(extension.log_evidence, nominal.log_evidence + SearchRules().enter_nats) << extension.name;
+  ASSERT_EQ(pairs.size(), 3u);
+  EXPECT_GT(pairs[0].log_evidence, nominal.log_evidence + 2 * SearchRules().enter_nats);
+  std::vector<std::string> names = Names(search.Run(Nominal(), 0)->fit);
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names, (std::vector<std::string>{"object_push", "oblique_slip"}));
+}
+
 TEST_F(StepwiseSearchTest, RemovesAnEffectThatTwoOthersMakeSuperfluous) {
   // The third column looks like the sum of the first two, which are the causes.
   rows.columns["gravity_sag"] =
