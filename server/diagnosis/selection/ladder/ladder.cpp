@@ -12,6 +12,7 @@
 #include "server/diagnosis/engine/candidate_ranking.h"
 #include "server/diagnosis/engine/findings.h"
 #include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/ladder/climb.h"
 #include "server/diagnosis/selection/ladder/doubts.h"
 #include "server/diagnosis/selection/ladder/hypotheses.h"
@@ -319,6 +320,10 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* 
     // The selection's own index counts the formula's effect.
     const bool behind_formula = selection->formula >= 0 && effect >= selection->formula;
     TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, effect + behind_formula, selection));
+    // What the step explained beside others is left over again.
+    const bool has_rest =
+        selection->formula >= 0 || selection->curve || selection->memory || selection->partial;
+    if (!has_rest) TOUCHSTONE_RETURN_IF_ERROR(CompeteWithCurves(workspace, selection));
     TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(selection));
   }
 }
