@@ -4,8 +4,8 @@
 #include "client/workbench_server/formula_words.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/formula.h"
-#include "server/effects/pixel_variables.h"
+#include "server/effects/formula/formula.h"
+#include "server/effects/formula/pixel_variables.h"
 
 namespace touchstone::cli {
 namespace {

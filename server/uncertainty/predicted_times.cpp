@@ -6,7 +6,7 @@
 #include "server/base/matern.h"
 #include "server/base/nan.h"
 #include "server/base/status.h"
-#include "server/effects/surface_departure.h"
+#include "server/effects/contact/surface_departure.h"
 #include "server/geometry/surface.h"
 #include "server/model/value_names.h"
 

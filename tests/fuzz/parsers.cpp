@@ -8,7 +8,7 @@
 #include "client/source/dataset_manifest.h"
 #include "server/base/test_folder.h"
 #include "server/effects/all_effects.h"
-#include "server/effects/formula_program.h"
+#include "server/effects/formula/formula_program.h"
 #include "server/gateway/arm/primary_message.h"
 #include "server/gateway/arm/rtde_message.h"
 #include "server/gateway/calibration/calibration.h"

@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 #include "server/geometry/displace.h"
 #include "server/geometry/mesh_file.h"
 #include "server/model/surface_map_file.h"

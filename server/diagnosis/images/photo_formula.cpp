@@ -12,7 +12,7 @@
 #include "server/diagnosis/images/photo_rest_sums.h"
 #include "server/diagnosis/images/photo_term_scores.h"
 #include "server/diagnosis/images/photo_terms.h"
-#include "server/effects/lookup.h"
+#include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "server/base/units.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 #include "server/image/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {

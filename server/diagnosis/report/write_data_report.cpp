@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/report/message_parts.h"
 #include "server/diagnosis/report/write_answers.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::report {

@@ -10,7 +10,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curves/term_factors.h"
 #include "server/diagnosis/selection/curves/term_scores.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "server/base/decompositions.h"
-#include "server/effects/surface_departure.h"
+#include "server/effects/contact/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

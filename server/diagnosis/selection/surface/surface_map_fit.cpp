@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/support_points.h"
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 #include "server/effects/touch_batch.h"
 #include "server/model/effect.h"
 

@@ -3,7 +3,7 @@
 // It acts on the report alone (the other fingers and the object stay where they are), so the extra travel
 // becomes time at the speed of the contact. Beyond 89.94 deg the tangent is held (incidence.h).
 #include "server/effects/define_effect.h"
-#include "server/effects/incidence.h"
+#include "server/effects/sensor/incidence.h"
 
 namespace touchstone::effects {
 namespace {

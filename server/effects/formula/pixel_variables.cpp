@@ -1,4 +1,4 @@
-#include "server/effects/pixel_variables.h"
+#include "server/effects/formula/pixel_variables.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>

@@ -9,9 +9,9 @@
 #include <tuple>
 
 #include "server/base/random.h"
+#include "server/effects/contact/smooth_field.h"
+#include "server/effects/contact/surface_departure.h"
 #include "server/effects/define_effect.h"
-#include "server/effects/smooth_field.h"
-#include "server/effects/surface_departure.h"
 #include "server/geometry/surface.h"
 
 namespace touchstone::effects {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 namespace touchstone::effects {
 namespace {

@@ -3,7 +3,7 @@
 // Needs gaussian_noise to have something to grow; the order of the two in the stack does not matter, since
 // the factor is kept apart (TouchBatch::noise_growth). Beyond 89.94 deg the tangent is held (incidence.h).
 #include "server/effects/define_effect.h"
-#include "server/effects/incidence.h"
+#include "server/effects/sensor/incidence.h"
 
 namespace touchstone::effects {
 namespace {

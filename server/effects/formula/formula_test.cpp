@@ -1,4 +1,4 @@
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "server/effects/user_term.h"
+#include "server/effects/formula/user_term.h"
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>

@@ -1,4 +1,4 @@
-#include "server/effects/surface_departure.h"
+#include "server/effects/contact/surface_departure.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 //   adds: grey        image sensor: the pixel of a photograph is recorded that much brighter
 // A finger without contact gets nothing. A value that is not finite is an error of the whole batch
 // (TouchBatch::formula_error), not a silent hole in the data.
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/match.h>
@@ -16,9 +16,9 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/formula_program.h"
-#include "server/effects/pixel_variables.h"
-#include "server/effects/user_term.h"
+#include "server/effects/formula/formula_program.h"
+#include "server/effects/formula/pixel_variables.h"
+#include "server/effects/formula/user_term.h"
 #include "server/model/user_term_fields.h"
 
 namespace touchstone::effects {

@@ -1,4 +1,4 @@
-#include "server/effects/smooth_field.h"
+#include "server/effects/contact/smooth_field.h"
 
 #include <gtest/gtest.h>
 

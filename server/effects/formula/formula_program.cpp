@@ -1,4 +1,4 @@
-#include "server/effects/formula_program.h"
+#include "server/effects/formula/formula_program.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
@@ -11,7 +11,7 @@
 #include "server/base/check.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 namespace touchstone::effects {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "server/effects/lookup.h"
+#include "server/effects/formula/lookup.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 // Linear between knots, because a person can read it off the file, it never overshoots what was measured, and the
 // diagnosis fits values at knots: what it claims is exactly what is simulated.
 // A finger without contact gets nothing. A covariate that is not finite is an error of the whole batch.
-#include "server/effects/lookup.h"
+#include "server/effects/formula/lookup.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -12,8 +12,8 @@
 
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/effects/pixel_variables.h"
-#include "server/effects/user_term.h"
+#include "server/effects/formula/pixel_variables.h"
+#include "server/effects/formula/user_term.h"
 #include "server/model/user_term_fields.h"
 
 namespace touchstone::effects {

@@ -1,7 +1,7 @@
 // Surface map: the real surface departs from its mesh as a diagnosis or a scan has found it.
 //   d_i -= h(contact_i) / cos(inc_i),  h the departure between the map's points (model/surface_map.md)
 // surface_error is the same of an unknown surface, drawn at random. An object that the map does not name keeps its mesh.
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -10,7 +10,7 @@
 
 #include "server/base/matern.h"
 #include "server/base/units.h"
-#include "server/effects/surface_departure.h"
+#include "server/effects/contact/surface_departure.h"
 #include "server/geometry/surface.h"
 
 namespace touchstone::effects {
