@@ -11,7 +11,7 @@
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/session/hdf5_driver.h"
+#include "server/session/hdf5/hdf5_driver.h"
 
 namespace touchstone::client {
 namespace {

@@ -7,7 +7,7 @@
 //   }
 #pragma once
 
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::client {
 

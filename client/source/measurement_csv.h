@@ -2,7 +2,7 @@
 // the same code.
 #pragma once
 
-#include "server/session/measurement_csv.h"
+#include "server/session/measurements/measurement_csv.h"
 
 namespace touchstone::client {
 

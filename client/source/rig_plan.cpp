@@ -14,8 +14,8 @@
 #include "server/base/status.h"
 #include "server/geometry/pose.h"
 #include "server/service/core/convert.h"
-#include "server/session/base_pose.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::client {
 namespace {

@@ -6,7 +6,7 @@
 #include "server/diagnosis/residuals/outlines.h"
 #include "server/geometry/pose.h"
 #include "server/geometry/supershape.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::workbench {
 namespace {

@@ -3,8 +3,8 @@
 #include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
-#include "server/session/emulated.h"
-#include "server/session/touch_content.h"
+#include "server/session/images/emulated.h"
+#include "server/session/measurements/touch_content.h"
 
 namespace touchstone::diagnosis {
 

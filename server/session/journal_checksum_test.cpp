@@ -11,8 +11,8 @@
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
 #include "server/base/text.h"
-#include "server/session/command_bytes.h"
-#include "server/session/journal.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/journal/journal.h"
 #include "server/session/session_files.h"
 
 namespace touchstone::session {

@@ -10,9 +10,9 @@
 #include "server/base/text.h"
 #include "server/base/touch_limits.h"
 #include "server/image/encode.h"
-#include "server/session/measurement_checks.h"
+#include "server/session/measurements/measurement_checks.h"
+#include "server/session/recorded/touch_series.h"
 #include "server/session/session_measurements.h"
-#include "server/session/touch_series.h"
 
 namespace touchstone::session {
 namespace {

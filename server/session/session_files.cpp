@@ -11,8 +11,8 @@
 #include "server/base/nan.h"
 #include "server/base/status.h"
 #include "server/base/text.h"
-#include "server/session/command_bytes.h"
-#include "server/session/emulated.h"
+#include "server/session/images/emulated.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/session/session_content_checks.h"
 #include "server/session/session_measurements.h"
 

@@ -5,7 +5,7 @@
 
 #include "server/base/test_folder.h"
 #include "server/image/encode.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/test_source.h"
 
 namespace touchstone::source {

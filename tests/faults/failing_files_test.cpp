@@ -5,8 +5,8 @@
 #include "server/base/new_file.h"
 #include "server/base/test_tier.h"
 #include "server/image/encode.h"
-#include "server/session/image_set_file.h"
-#include "server/session/image_set_hdf5.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/image_set_hdf5.h"
 #include "server/session/session_files.h"
 #include "tests/faults/failing_test.h"
 

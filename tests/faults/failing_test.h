@@ -19,7 +19,7 @@
 
 #include "server/base/test_folder.h"
 #include "server/base/text.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 #include "tests/faults/failing_files.h"
 
 namespace touchstone::faults {

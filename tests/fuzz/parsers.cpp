@@ -16,10 +16,10 @@
 #include "server/model/model.h"
 #include "server/model/surface_map_file.h"
 #include "server/service/options/option_table.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/images_csv.h"
-#include "server/session/journal.h"
-#include "server/session/measurement_csv.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/images_csv.h"
+#include "server/session/journal/journal.h"
+#include "server/session/measurements/measurement_csv.h"
 #include "tests/fuzz/frame_fuzz.h"
 
 namespace touchstone::fuzz {

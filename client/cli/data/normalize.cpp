@@ -14,7 +14,7 @@
 #include "server/base/text.h"
 #include "server/image/encode.h"
 #include "server/image/normalize.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

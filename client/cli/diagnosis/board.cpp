@@ -9,7 +9,7 @@
 #include "server/diagnosis/report/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
-#include "server/session/camera_yaml.h"
+#include "server/session/images/camera_yaml.h"
 
 namespace touchstone::cli {
 namespace {

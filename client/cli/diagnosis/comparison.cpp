@@ -21,7 +21,7 @@
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/calls/evidence.h"
-#include "server/session/touch_content.h"
+#include "server/session/measurements/touch_content.h"
 
 namespace touchstone::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include "client/report/words.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

@@ -17,7 +17,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/model/parameter_values.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::cli {
 namespace {

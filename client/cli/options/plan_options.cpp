@@ -14,7 +14,7 @@
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

@@ -17,7 +17,7 @@
 #include "server/gateway/calibration/tool_calibration.h"
 #include "server/geometry/pose.h"
 #include "server/model/model.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::cli {
 namespace {

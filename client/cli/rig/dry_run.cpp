@@ -9,7 +9,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/geometry/pose.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::cli {
 namespace {

@@ -13,7 +13,7 @@
 #include "server/base/text.h"
 #include "server/base/units.h"
 #include "server/model/finger_name.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::cli {
 namespace {

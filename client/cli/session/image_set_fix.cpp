@@ -11,7 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/image/encode.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -14,8 +14,8 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/sessions/stored_session.h"
-#include "server/session/image_set_file.h"
-#include "server/session/image_set_hdf5.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {

@@ -12,7 +12,7 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/service/sessions/measured_set_message.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -18,8 +18,8 @@
 #include "server/base/status.h"
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/session/image_set_file.h"
-#include "server/session/image_set_hdf5.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "server/image/photo_lens.h"
 #include "server/model/model.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::boards {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/diagnosis/engine/result.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "server/diagnosis/checks/photo_mistake_list.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::checks {
 

@@ -7,7 +7,7 @@
 
 #include "server/base/text.h"
 #include "server/base/units.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

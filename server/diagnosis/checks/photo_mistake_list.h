@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
-#include "server/session/image_set_fix.h"
+#include "server/session/images/image_set_fix.h"
 
 namespace touchstone::diagnosis::checks {
 

@@ -20,7 +20,7 @@
 
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/input.h"
-#include "server/session/image_set_fix.h"
+#include "server/session/images/image_set_fix.h"
 
 namespace touchstone::diagnosis::checks {
 

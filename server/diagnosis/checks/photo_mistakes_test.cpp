@@ -4,7 +4,7 @@
 
 #include "server/base/test_tier.h"
 #include "server/diagnosis/images/photo_test_set.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -9,7 +9,7 @@
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -1,6 +1,6 @@
 #include "server/diagnosis/checks/stale_rows.h"
 
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

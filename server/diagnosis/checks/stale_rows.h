@@ -1,7 +1,7 @@
 // Rows that hold the times of the row before: the reading was not renewed.
 #pragma once
 
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::diagnosis::checks {
 

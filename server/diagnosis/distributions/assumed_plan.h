@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/geometry/surface.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 #include "server/touch/plan.h"
 
 namespace touchstone::diagnosis::distributions {

@@ -10,7 +10,7 @@
 #include "server/diagnosis/engine/parameter_estimate.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 #include "server/uncertainty/budget.h"
 
 namespace touchstone::diagnosis::images {

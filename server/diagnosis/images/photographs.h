@@ -11,7 +11,7 @@
 #include "server/diagnosis/images/pixel_noise.h"
 #include "server/diagnosis/input.h"
 #include "server/image/simulate_photo.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -9,8 +9,8 @@
 #include "server/diagnosis/report/summary.h"
 #include "server/effects/all_effects.h"
 #include "server/model/finger_name.h"
-#include "server/session/emulated.h"
-#include "server/session/touch_content.h"
+#include "server/session/images/emulated.h"
+#include "server/session/measurements/touch_content.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "server/session/emulated.h"
+#include "server/session/images/emulated.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

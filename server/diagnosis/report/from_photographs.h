@@ -2,7 +2,7 @@
 #pragma once
 
 #include "server/diagnosis/report/diagnosis.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::report {
 

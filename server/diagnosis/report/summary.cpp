@@ -12,7 +12,7 @@
 #include "server/diagnosis/report/distributions_summary.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
-#include "server/session/emulated.h"
+#include "server/session/images/emulated.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

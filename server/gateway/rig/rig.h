@@ -30,7 +30,7 @@
 #include "server/gateway/rig/session_clock.h"
 #include "server/gateway/rig/unwritten_outcomes.h"
 #include "server/geometry/mesh.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 #include "server/source/rig_device.h"
 
 namespace touchstone::gateway {

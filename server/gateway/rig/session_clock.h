@@ -13,7 +13,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::gateway {
 

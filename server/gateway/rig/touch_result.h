@@ -9,7 +9,7 @@
 #include "server/gateway/arm/arm.h"
 #include "server/gateway/effector/effector.h"
 #include "server/gateway/timing/clock_sync.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::gateway {
 

@@ -15,7 +15,7 @@
 #include "server/service/core/sent_model.h"
 #include "server/service/sessions/measured_set_message.h"
 #include "server/service/sessions/stored_session.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::service {
 namespace {

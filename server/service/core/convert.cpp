@@ -5,7 +5,7 @@
 #include "server/base/printable.h"
 #include "server/base/status.h"
 #include "server/service/core/sent_model.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 
 namespace touchstone::service {
 

@@ -8,7 +8,7 @@
 #include "server/gateway/calibration/resting_face.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/physical_source.h"
 
 namespace touchstone::service {

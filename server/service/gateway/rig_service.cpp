@@ -12,7 +12,7 @@
 #include "server/service/calls/call_guard.h"
 #include "server/service/connections/relayed_peer.h"
 #include "server/service/core/convert.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "server/source/request_checks.h"
 
 namespace touchstone::service {

@@ -8,7 +8,7 @@
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
 #include "server/service/gateway/rig_service.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "server/source/physical_source.h"
 
 namespace touchstone::service {

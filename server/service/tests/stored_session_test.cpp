@@ -12,7 +12,7 @@
 #include "server/service/calls/evidence.h"
 #include "server/service/core/resources.h"
 #include "server/service/sessions/session_store.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::service {
 namespace {

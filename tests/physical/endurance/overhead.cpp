@@ -13,7 +13,7 @@
 #include "server/service/core/convert.h"
 #include "server/service/core/resources.h"
 #include "server/service/gateway/gateway_options.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "tests/physical/endurance/measure.h"
 #include "tests/physical/endurance/stamped_parts.h"
 #include "tests/physical/physical_test.h"
