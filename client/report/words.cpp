@@ -16,7 +16,7 @@
 #include <absl/strings/strip.h>
 
 #include "client/report/error_scale.h"
-#include "server/base/file_label.h"
+#include "server/base/files/file_label.h"
 #include "server/base/units.h"
 
 namespace touchstone::client {

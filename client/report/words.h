@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/base/readable_time.h"
+#include "server/base/text/readable_time.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::client {

@@ -16,7 +16,7 @@
 #include "client/source/credentials.h"
 #include "client/source/errors.h"
 #include "client/source/retry.h"
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 #include "server/service/options/server_options.h"
 #include "server/service/rpc/server.h"
 #include "touchstone/v1/control.grpc.pb.h"

@@ -11,7 +11,7 @@
 
 #include <future>
 
-#include "server/base/manual_clock.h"
+#include "server/base/threads/manual_clock.h"
 
 namespace touchstone::client {
 namespace {

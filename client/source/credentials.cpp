@@ -9,7 +9,7 @@
 #include <cstdlib>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/channel/channel.h"
 #include "server/service/channel/host_port.h"
 

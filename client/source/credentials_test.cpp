@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "client/source/connection.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/service/core/access.h"
 #include "server/service/tests/test_certificates.h"
 

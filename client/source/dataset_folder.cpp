@@ -6,7 +6,7 @@
 
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace fs = std::filesystem;

@@ -7,8 +7,8 @@
 #include "client/source/lab_units.h"
 #include "client/source/npy.h"
 #include "client/source/sample_text.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/version.h"
 
 namespace touchstone::client {
 namespace {

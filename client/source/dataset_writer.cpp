@@ -13,9 +13,9 @@
 
 #include "client/source/dataset_folder.h"
 #include "client/source/synced_file.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

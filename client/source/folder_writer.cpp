@@ -11,7 +11,7 @@
 #include "client/source/shard_writer.h"
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

@@ -10,7 +10,7 @@
 #include "client/source/shard_writer.h"
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/hdf5/hdf5_driver.h"
 
 namespace touchstone::client {

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "client/source/batch.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

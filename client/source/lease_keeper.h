@@ -14,7 +14,7 @@
 #include <absl/status/statusor.h>
 
 #include "client/source/connection.h"
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::client {
 

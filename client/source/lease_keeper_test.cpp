@@ -12,7 +12,7 @@
 #include <future>
 
 #include "client/source/leased_source.h"
-#include "server/base/manual_clock.h"
+#include "server/base/threads/manual_clock.h"
 
 namespace touchstone::client {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "client/source/connection.h"
 #include "client/source/lease_keeper.h"
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::client {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <random>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::client {
 

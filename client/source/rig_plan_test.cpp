@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::client {
 namespace {

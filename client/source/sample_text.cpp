@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

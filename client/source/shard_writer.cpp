@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

@@ -14,9 +14,9 @@
 
 #include "client/source/measurement_csv.h"
 #include "client/source/npy.h"
-#include "server/base/full_disk.h"
+#include "server/base/files/full_disk.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

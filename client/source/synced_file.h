@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 
 namespace touchstone::client {
 

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "server/base/printable.h"
+#include "server/base/text/printable.h"
 #include "server/service/options/access_roles.h"
 
 namespace touchstone::workbench {

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "client/workbench_server/request_guard.h"
-#include "server/base/tcp_listen.h"
+#include "server/base/process/tcp_listen.h"
 
 namespace touchstone::workbench {
 namespace {

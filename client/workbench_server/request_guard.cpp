@@ -6,8 +6,8 @@
 #include <openssl/rand.h>
 
 #include "server/base/check.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::workbench {
 namespace {

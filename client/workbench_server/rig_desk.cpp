@@ -7,8 +7,8 @@
 #include <chrono>
 #include <utility>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::workbench {
 namespace {

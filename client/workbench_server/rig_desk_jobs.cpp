@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "client/workbench_server/rig_desk.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 #include "server/model/model.h"
 
 namespace touchstone::workbench {

@@ -15,7 +15,7 @@
 #include "client/workbench_server/example.h"
 #include "client/workbench_server/grpc_web.h"
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/rpc/server.h"
 
 namespace touchstone::workbench {

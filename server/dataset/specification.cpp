@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/image/normalize.h"
 #include "server/image/photo_image.h"

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/readable_time.h"
 #include "server/base/status.h"
+#include "server/base/text/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/report/from_touches.h"

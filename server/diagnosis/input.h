@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/geometry/surface.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/summary.h"

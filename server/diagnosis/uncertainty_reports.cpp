@@ -6,8 +6,8 @@
 #include <array>
 #include <map>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
+#include "server/base/text/file_number.h"
 #include "server/base/units.h"
 #include "server/diagnosis/design/plan_check.h"
 #include "server/diagnosis/how_wrong.h"

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"

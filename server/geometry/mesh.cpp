@@ -11,7 +11,7 @@
 #include <limits>
 
 #include "server/base/check.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pieces.h"
 
 namespace touchstone::geometry {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::geometry {

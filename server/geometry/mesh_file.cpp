@@ -11,9 +11,9 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
+#include "server/base/text/utf16.h"
 #include "server/base/units.h"
-#include "server/base/utf16.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {

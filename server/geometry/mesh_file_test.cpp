@@ -7,9 +7,9 @@
 #include <cstring>
 #include <filesystem>
 
-#include "server/base/file_writer.h"
-#include "server/base/random.h"
-#include "server/base/text.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/numbers/random.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::geometry {
 namespace {

@@ -7,9 +7,9 @@
 #include <chrono>
 #include <filesystem>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::geometry {

@@ -7,9 +7,9 @@
 #include <charconv>
 #include <cmath>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/geometry/mesh_file.h"
 

@@ -9,7 +9,7 @@
 #include <iterator>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <thread>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 
 namespace touchstone::geometry {
 

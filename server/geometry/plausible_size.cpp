@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/geometry/mesh_file.h"
 

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/geometry/ply.h"
 
 namespace touchstone::geometry::ply {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "server/base/check.h"
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/geometry/search.h"
 
 namespace touchstone::geometry {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "server/base/check.h"
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/geometry/lanes.h"
 #include "server/geometry/search.h"
 #include "server/geometry/swept_triangle.h"

@@ -7,7 +7,7 @@
 
 #include "server/base/check.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::geometry {

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
 

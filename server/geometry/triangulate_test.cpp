@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/geometry/mesh_reader.h"
 
 namespace touchstone::geometry {

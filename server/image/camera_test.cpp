@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/units.h"
 #include "server/image/renderer.h"
 #include "server/image/view.h"

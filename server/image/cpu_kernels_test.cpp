@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/image/cpu_frame.h"
 #include "server/image/test_scene.h"
 

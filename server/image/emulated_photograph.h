@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/geometry/surface.h"
 #include "server/image/normalize_ground.h"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::image {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/image/emulated_photograph.h"
 #include "server/image/normalize.h"

@@ -13,7 +13,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/sanitizers.h"
 #include "server/base/test_paths.h"
 #include "server/base/test_tier.h"

@@ -5,7 +5,7 @@
 
 #include <absl/strings/str_format.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/image/photo_power.h"

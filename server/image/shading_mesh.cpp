@@ -6,7 +6,7 @@
 #include <cstring>
 #include <numeric>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/image/shading.h"
 
 namespace touchstone::image {

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::model {

@@ -4,7 +4,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"

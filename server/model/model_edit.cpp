@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/formula_fields.h"
 #include "server/model/lookup_fields.h"
 #include "server/model/model.h"

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/finger_name.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"

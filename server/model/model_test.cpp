@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/parameter_values.h"
 #include "server/model/yaml_tree.h"
 

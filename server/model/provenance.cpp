@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/yaml_text.h"
 
 namespace touchstone::model {

@@ -10,8 +10,8 @@
 #include <sstream>
 #include <unordered_set>
 
-#include "server/base/text.h"
-#include "server/base/utf16.h"
+#include "server/base/text/text.h"
+#include "server/base/text/utf16.h"
 
 namespace touchstone::model {
 namespace {

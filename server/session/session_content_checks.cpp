@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/image/encode.h"
 #include "server/session/measurements/measurement_checks.h"

@@ -11,9 +11,9 @@
 #include <limits>
 #include <random>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/encode.h"
 #include "server/session/images/emulated.h"
 #include "server/session/journal/command_bytes.h"

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/hdf5/hdf5_file.h"
 #include "server/session/images/emulated.h"
 #include "server/session/journal/command_bytes.h"

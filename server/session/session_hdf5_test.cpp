@@ -9,11 +9,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/base/file_writer.h"
-#include "server/base/nan.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/encode.h"
 #include "server/session/hdf5/hdf5_handle.h"
 #include "server/session/recorded/touch_series.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/emulated.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 #include "server/session/images/emulated.h"
 #include "server/session/journal/command_bytes.h"

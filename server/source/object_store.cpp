@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/supershape.h"
 

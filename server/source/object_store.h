@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/geometry/surface.h"
 
 namespace touchstone::source {

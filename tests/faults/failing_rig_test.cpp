@@ -6,8 +6,8 @@
 #include <future>
 #include <thread>
 
-#include "server/base/clock.h"
 #include "server/base/test_tier.h"
+#include "server/base/threads/clock.h"
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/rig/idle_effector.h"
 #include "server/gateway/rig/rig.h"

@@ -18,7 +18,7 @@
 #include <string>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/journal/journal.h"
 #include "tests/faults/failing_files.h"
 

@@ -3,7 +3,7 @@
 
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/service/core/convert.h"

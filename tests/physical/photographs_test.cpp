@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/base/full_disk.h"
+#include "server/base/files/full_disk.h"
 #include "server/base/units.h"
 #include "server/service/sessions/stored_session.h"
 #include "server/session/images/emulated.h"

@@ -11,7 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/surface.h"
 #include "tests/rig/emulator_commands.h"
 #include "tests/rig/emulator_files.h"

@@ -18,11 +18,11 @@
 #include "client/cli/common/provenance.h"
 #include "client/cli/common/terminal.h"
 #include "client/source/lease_keeper.h"
-#include "server/base/printable.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/version.h"
-#include "server/base/whole_number.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
+#include "server/base/text/whole_number.h"
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::cli {

@@ -10,7 +10,7 @@
 #include "client/source/lab_units.h"
 #include "client/source/npy.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/image/encode.h"

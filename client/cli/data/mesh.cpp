@@ -6,7 +6,7 @@
 #include "client/cli/options/mesh_options.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/geometry/plausible_size.h"
 #include "server/geometry/supershape.h"

@@ -7,7 +7,7 @@
 
 #include "client/cli/options/mesh_options.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/contact/surface_map.h"
 #include "server/geometry/displace.h"

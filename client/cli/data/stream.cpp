@@ -16,7 +16,7 @@
 #include "client/source/dataset_folder.h"
 #include "client/source/dataset_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

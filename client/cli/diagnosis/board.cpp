@@ -2,7 +2,7 @@
 
 #include "client/cli/options/model_output.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/boards/board_pictures.h"
 #include "server/diagnosis/report/from_boards.h"

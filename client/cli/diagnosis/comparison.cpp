@@ -16,7 +16,7 @@
 #include "client/workbench/page.h"
 #include "server/base/check.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/mesh_file.h"
 #include "server/model/model.h"

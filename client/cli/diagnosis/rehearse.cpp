@@ -13,7 +13,7 @@
 #include "client/cli/diagnosis/rehearsed_files.h"
 #include "client/source/measurement_csv.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::cli {

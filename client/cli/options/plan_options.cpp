@@ -10,7 +10,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"

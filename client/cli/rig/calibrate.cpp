@@ -9,7 +9,7 @@
 #include "client/cli/session/journal_session.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/gateway/calibration/calibration.h"

@@ -7,7 +7,7 @@
 #include "client/cli/rig/calibrate.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/object_registration.h"

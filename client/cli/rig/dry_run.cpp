@@ -7,7 +7,7 @@
 #include "client/report/path_drawing.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
 #include "server/session/recorded/base_pose.h"
 

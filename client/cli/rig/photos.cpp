@@ -11,7 +11,7 @@
 #include "client/cli/session/image_set.h"
 #include "client/source/batch.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"
 

@@ -7,7 +7,7 @@
 #include "client/cli/rig/rig.h"
 #include "client/source/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::cli {

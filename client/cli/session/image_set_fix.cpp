@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/encode.h"
 #include "server/session/images/image_set_file.h"
 

@@ -16,7 +16,7 @@
 #include "client/cli/session/verify.h"
 #include "client/source/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/images/image_set_file.h"
 #include "server/session/images/image_set_hdf5.h"

@@ -12,7 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/whole_picture.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/image_set_file.h"

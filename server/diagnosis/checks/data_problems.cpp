@@ -9,9 +9,9 @@
 #include <cmath>
 #include <optional>
 
-#include "server/base/readable_time.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/readable_time.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/checks/duplicates.h"
 #include "server/diagnosis/checks/mesh_units.h"

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/measurements/measurement_fix.h"
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/diagnosis/checks/odd_pictures.h"
 #include "server/diagnosis/checks/photo_channel_order.h"
 #include "server/diagnosis/checks/photo_mistake_list.h"

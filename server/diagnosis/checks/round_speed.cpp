@@ -5,7 +5,7 @@
 #include <map>
 #include <optional>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

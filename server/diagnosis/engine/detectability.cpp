@@ -6,8 +6,8 @@
 #include <cmath>
 #include <set>
 
-#include "server/base/distributions.h"
-#include "server/base/normal.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition.h"

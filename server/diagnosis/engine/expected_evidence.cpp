@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/engine/resemblance.h"

@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/engine/likelihood.h"
 #include "server/diagnosis/engine/observation_model.h"

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <optional>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::engine {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
-#include "server/base/matern.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/matern.h"
 #include "server/diagnosis/engine/support_points.h"
 
 namespace touchstone::diagnosis::engine {

@@ -14,7 +14,7 @@
 
 #include <Eigen/Core>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/engine/smooth_error.h"
 
 namespace touchstone::diagnosis::engine {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/engine/observation_model.h"
 
 namespace touchstone::diagnosis::engine {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/base/check.h"
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::engine {

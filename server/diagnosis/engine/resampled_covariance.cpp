@@ -4,8 +4,8 @@
 #include <map>
 #include <vector>
 
-#include "server/base/decompositions.h"
-#include "server/base/random.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 
 namespace touchstone::diagnosis::engine {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "server/base/distributions.h"
-#include "server/base/random.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/held_out.h"
 

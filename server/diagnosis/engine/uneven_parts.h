@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/diagnosis/engine/result.h"
 
 namespace touchstone::diagnosis::engine {

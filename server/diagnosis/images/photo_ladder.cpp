@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/candidate_ranking.h"
 #include "server/diagnosis/engine/ladder.h"

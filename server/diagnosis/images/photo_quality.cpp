@@ -6,8 +6,8 @@
 #include <numeric>
 #include <set>
 
-#include "server/base/distributions.h"
-#include "server/base/normal.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/images/photo_cells.h"

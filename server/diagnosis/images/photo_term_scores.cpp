@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"

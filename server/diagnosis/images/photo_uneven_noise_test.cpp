@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photo_test_set.h"
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/held_out.h"
 

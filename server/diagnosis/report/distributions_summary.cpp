@@ -4,7 +4,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include "server/base/readable_time.h"
+#include "server/base/text/readable_time.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

@@ -5,7 +5,7 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include "server/base/file_label.h"
+#include "server/base/files/file_label.h"
 #include "server/diagnosis/report/summary.h"
 
 namespace touchstone::diagnosis::report {

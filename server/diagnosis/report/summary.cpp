@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/readable_time.h"
+#include "server/base/text/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/distributions_summary.h"
 #include "server/diagnosis/selection/session/time_structure.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/permutation.h"
 
 namespace touchstone::diagnosis::residuals {

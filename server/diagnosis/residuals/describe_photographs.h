@@ -2,7 +2,7 @@
 // the pictures one by one. Residuals are measured minus expected grey levels, pixel by pixel.
 #pragma once
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/images/photographs.h"
 

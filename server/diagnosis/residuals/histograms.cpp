@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/permutation.h"
 

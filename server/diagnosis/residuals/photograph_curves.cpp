@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/permutation.h"
 #include "server/diagnosis/residuals/photograph_covariates.h"
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/photograph_covariates.h"
 #include "server/diagnosis/residuals/slice_search.h"
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {

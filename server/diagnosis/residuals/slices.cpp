@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/random.h"
-#include "server/base/readable_time.h"
+#include "server/base/numbers/random.h"
+#include "server/base/text/readable_time.h"
 #include "server/diagnosis/residuals/slice_search.h"
 
 namespace touchstone::diagnosis::residuals {

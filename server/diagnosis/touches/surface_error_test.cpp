@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/touches/predictor.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 #include "server/diagnosis/touches/touch_observation_model.h"

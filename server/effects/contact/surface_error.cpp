@@ -8,7 +8,7 @@
 #include <mutex>
 #include <tuple>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/effects/contact/smooth_field.h"
 #include "server/effects/contact/surface_departure.h"
 #include "server/effects/define_effect.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/geometry/surface.h"
 
 #include "server/effects/effect_test_batch.h"

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/matern.h"
+#include "server/base/numbers/matern.h"
 #include "server/base/units.h"
 #include "server/effects/contact/surface_departure.h"
 #include "server/geometry/surface.h"

@@ -15,7 +15,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/formula/formula_program.h"
 #include "server/effects/formula/pixel_variables.h"
 #include "server/effects/formula/user_term.h"

@@ -11,7 +11,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/formula/pixel_variables.h"
 #include "server/effects/formula/user_term.h"
 #include "server/model/user_term_fields.h"

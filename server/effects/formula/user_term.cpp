@@ -3,7 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::effects {
 

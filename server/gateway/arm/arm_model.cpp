@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::gateway::arm {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::gateway::arm {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::gateway::arm {
 namespace {

@@ -9,9 +9,9 @@
 #include <optional>
 #include <utility>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/line_check.h"
 #include "server/gateway/arm/transit.h"

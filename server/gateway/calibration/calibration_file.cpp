@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/geometry/pose.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/printable.h"
+#include "server/base/text/printable.h"
 #include "server/gateway/arm/ur_modes.h"
 
 namespace touchstone::gateway {

@@ -4,7 +4,7 @@
 
 #include <atomic>
 
-#include "server/base/manual_clock.h"
+#include "server/base/threads/manual_clock.h"
 
 namespace touchstone::gateway {
 namespace {

@@ -10,7 +10,7 @@
 #include <random>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/session/journal/command_bytes.h"
 

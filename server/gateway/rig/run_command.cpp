@@ -13,7 +13,7 @@
 #include <cstring>
 #include <thread>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 extern char** environ;
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 #include "server/gateway/timing/host_time.h"
 

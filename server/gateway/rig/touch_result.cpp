@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/rig/approach_fit.h"
 #include "server/gateway/rig/touch_series.h"
 #include "server/geometry/pose.h"

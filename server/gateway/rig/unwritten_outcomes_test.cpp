@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/full_disk.h"
+#include "server/base/files/full_disk.h"
 #include "server/base/test_folder.h"
 
 namespace touchstone::gateway {

@@ -9,7 +9,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/sent_model.h"

@@ -2,8 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/effects/all_effects.h"
 #include "server/model/yaml_tree.h"
 

@@ -2,8 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/resting_face.h"
 #include "server/service/calls/source_messages.h"

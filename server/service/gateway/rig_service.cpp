@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
 #include "server/service/calls/call_guard.h"
 #include "server/service/connections/relayed_peer.h"

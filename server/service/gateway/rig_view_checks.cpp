@@ -1,8 +1,8 @@
 // Rig.CheckViews: every check of a photograph, without motion.
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/geometry/pose.h"
 #include "server/image/renderer.h"
 #include "server/service/calls/source_messages.h"

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/mesh_file.h"
 
 namespace touchstone::service {

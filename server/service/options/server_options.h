@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 #include "server/image/renderer.h"
 #include "server/service/options/access_options.h"
 #include "server/service/options/limits.h"

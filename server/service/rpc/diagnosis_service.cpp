@@ -10,9 +10,9 @@
 #include <mutex>
 #include <thread>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/write_report.h"

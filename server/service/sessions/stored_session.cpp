@@ -7,7 +7,7 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/csv/csv_fields.h"
 #include "server/session/images/image_set_file.h"
 #include "server/session/images/images_csv.h"

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/encode.h"
 #include "server/service/calls/evidence.h"
 #include "server/service/core/resources.h"

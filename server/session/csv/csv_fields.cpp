@@ -12,7 +12,7 @@
 #include <cstdint>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/csv/plain_csv.h"
 
 namespace touchstone::session {

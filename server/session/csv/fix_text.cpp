@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/utf16.h"
+#include "server/base/text/text.h"
+#include "server/base/text/utf16.h"
 #include "server/session/csv/csv_fields.h"
 
 namespace touchstone::session {

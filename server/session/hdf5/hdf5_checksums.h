@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 
 namespace touchstone::session {

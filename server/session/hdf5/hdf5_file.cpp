@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <map>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/hdf5/hdf5_checksums.h"
 
 namespace touchstone::session {

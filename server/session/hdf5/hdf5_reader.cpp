@@ -6,7 +6,7 @@
 #include <map>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/hdf5/hdf5_checksums.h"
 #include "server/session/hdf5/hdf5_file.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/image.h"
 #include "server/model/yaml_tree.h"
 #include "server/session/csv/csv_fields.h"

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/csv/csv_fields.h"
 #include "server/session/measurements/measurement_columns.h"
 

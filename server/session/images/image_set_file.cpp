@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/image/encode.h"
 #include "server/session/csv/csv_fields.h"
 #include "server/session/images/camera_yaml.h"

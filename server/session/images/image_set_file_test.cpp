@@ -10,7 +10,7 @@
 #include <random>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/image/encode.h"
 #include "server/session/images/camera_yaml.h"

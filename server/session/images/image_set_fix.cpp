@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/csv/fix_text.h"
 #include "server/session/measurements/measurement_fix.h"
 

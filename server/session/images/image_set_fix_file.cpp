@@ -10,7 +10,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/csv/csv_fields.h"
 #include "server/session/csv/fix_text.h"

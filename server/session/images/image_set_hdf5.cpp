@@ -7,7 +7,7 @@
 #include <limits>
 #include <tuple>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 #include "server/image/image.h"
 #include "server/session/hdf5/hdf5_file.h"

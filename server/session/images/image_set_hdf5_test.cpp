@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/images/image_set.h"
 #include "server/session/images/image_set_file.h"
 

@@ -11,9 +11,9 @@
 
 #include <Eigen/Geometry>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/model/parameter_values.h"

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/journal/journal_file.h"
 #include "server/session/journal/journal_rows.h"

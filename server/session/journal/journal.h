@@ -18,7 +18,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 
 namespace touchstone::session {
 

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/journal/journal.h"
 
 namespace touchstone::session {

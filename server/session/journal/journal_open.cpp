@@ -11,7 +11,7 @@
 #include <cstring>
 #include <map>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 #include "server/session/journal/journal_schema.h"
 #include "server/session/journal/journal_seal.h"

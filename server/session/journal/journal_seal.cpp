@@ -4,7 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 namespace {

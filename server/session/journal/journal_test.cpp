@@ -10,9 +10,9 @@
 #include <limits>
 #include <thread>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/session/journal/command_bytes.h"
 
 namespace touchstone::session {

@@ -6,7 +6,7 @@
 #include <absl/strings/str_split.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/file_number.h"
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/model/model.h"
 #include "server/session/csv/csv_fields.h"

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/model/parameter_values.h"
 #include "server/session/csv/csv_fields.h"

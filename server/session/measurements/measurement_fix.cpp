@@ -12,9 +12,9 @@
 #include <cstring>
 #include <numeric>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/model/finger_name.h"
 #include "server/session/csv/fix_text.h"

@@ -8,11 +8,11 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/file_number.h"
-#include "server/base/nan.h"
-#include "server/base/over_limit.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/session/csv/csv_fields.h"

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 namespace {

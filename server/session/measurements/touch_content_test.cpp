@@ -3,7 +3,7 @@
 #include <absl/strings/str_replace.h>
 #include <gtest/gtest.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::session {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 
 namespace touchstone::session {
 namespace {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/journal/command_bytes.h"
 

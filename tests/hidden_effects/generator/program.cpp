@@ -7,7 +7,7 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
 #include "server/session/measurements/measurement_set.h"
 

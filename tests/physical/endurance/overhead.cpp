@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"

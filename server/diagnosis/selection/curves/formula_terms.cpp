@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curves/term_factors.h"
 #include "server/diagnosis/selection/curves/term_scores.h"

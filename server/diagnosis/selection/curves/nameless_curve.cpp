@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/held_out_curve.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 

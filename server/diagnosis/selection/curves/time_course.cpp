@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/candidate_course.h"

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/readable_time.h"
 #include "server/base/status.h"
+#include "server/base/text/readable_time.h"
 #include "server/diagnosis/engine/candidate_ranking.h"
 #include "server/diagnosis/engine/findings.h"
 #include "server/diagnosis/engine/held_out.h"

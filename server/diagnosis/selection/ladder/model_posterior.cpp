@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/diagnosis/engine/support_points.h"
 #include "server/model/parameter_values.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/touches/noise_sample.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/diagnosis/touches/noise_sample.h"
 #include "server/model/model.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/effects/contact/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/matern.h"
+#include "server/base/numbers/matern.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/support_points.h"
