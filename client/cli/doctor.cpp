@@ -21,7 +21,7 @@
 #include "server/base/status.h"
 #include "server/diagnosis/boards/board_pictures.h"
 #include "server/geometry/surface.h"
-#include "server/image/renderer.h"
+#include "server/image/renderers/renderer.h"
 #include "server/service/channel/channel.h"
 
 namespace touchstone::cli {

@@ -5,8 +5,8 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/image/normalize.h"
-#include "server/image/photo_image.h"
+#include "server/image/normalize/normalize.h"
+#include "server/image/photograph/photo_image.h"
 
 namespace touchstone::dataset {
 namespace {

@@ -10,7 +10,7 @@
 #include <absl/status/status.h>
 
 #include "server/geometry/surface.h"
-#include "server/image/renderer.h"
+#include "server/image/renderers/renderer.h"
 #include "server/model/model.h"
 #include "server/touch/plan.h"
 #include "server/uncertainty/posterior.h"

@@ -9,7 +9,7 @@
 #include "server/base/text/printable.h"
 #include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/measurements/measurement_checks.h"
 #include "server/session/recorded/touch_series.h"
 #include "server/session/session_measurements.h"

@@ -14,7 +14,7 @@
 #include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
 #include "server/base/text/text.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/images/emulated.h"
 #include "server/session/journal/command_bytes.h"
 #include "server/session/session_measurements.h"

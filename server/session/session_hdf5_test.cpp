@@ -14,7 +14,7 @@
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
 #include "server/base/text/text.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/hdf5/hdf5_handle.h"
 #include "server/session/recorded/touch_series.h"
 #include "server/session/session_files.h"

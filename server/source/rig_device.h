@@ -11,7 +11,7 @@
 
 #include "server/geometry/mesh.h"
 #include "server/image/image.h"
-#include "server/image/photograph.h"
+#include "server/image/photograph/photograph.h"
 #include "server/session/journal/journal.h"
 #include "server/source/motion_guard.h"
 #include "server/source/source_state.h"

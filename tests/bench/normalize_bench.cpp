@@ -12,8 +12,8 @@
 
 #include "server/base/test_paths.h"
 #include "server/geometry/mesh_file.h"
-#include "server/image/emulated_photograph.h"
-#include "server/image/normalize.h"
+#include "server/image/normalize/emulated_photograph.h"
+#include "server/image/normalize/normalize.h"
 
 namespace touchstone::image {
 namespace {

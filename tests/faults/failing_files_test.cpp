@@ -4,7 +4,7 @@
 #include "server/base/files/file_writer.h"
 #include "server/base/files/new_file.h"
 #include "server/base/test_tier.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/images/image_set_file.h"
 #include "server/session/images/image_set_hdf5.h"
 #include "server/session/session_files.h"

@@ -13,7 +13,7 @@
 #include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/service/core/convert.h"
 
 namespace touchstone::cli {

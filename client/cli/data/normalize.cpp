@@ -12,8 +12,8 @@
 #include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/image/encode.h"
-#include "server/image/normalize.h"
+#include "server/image/encoding/encode.h"
+#include "server/image/normalize/normalize.h"
 #include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {

@@ -10,7 +10,7 @@
 #include "client/source/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/image/photograph.h"
+#include "server/image/photograph/photograph.h"
 #include "server/service/core/convert.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/emulated.h"

@@ -6,7 +6,7 @@
 
 #include "client/cli/session/image_set.h"
 #include "server/base/test_folder.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/emulated.h"
 #include "server/session/images/image_set_file.h"

@@ -13,7 +13,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/image/whole_picture.h"
+#include "server/image/encoding/whole_picture.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/image_set_file.h"
 

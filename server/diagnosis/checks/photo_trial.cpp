@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -9,7 +9,7 @@
 
 #include "server/base/units.h"
 #include "server/effects/formula/formula.h"
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -15,7 +15,7 @@
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
 #include "server/geometry/supershape.h"
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -10,7 +10,7 @@
 #include "server/diagnosis/images/photo_explanations.h"
 #include "server/diagnosis/images/pixel_noise.h"
 #include "server/diagnosis/input.h"
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 #include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::images {

@@ -4,7 +4,7 @@
 
 #include "server/base/check.h"
 #include "server/diagnosis/report/write_data_report.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

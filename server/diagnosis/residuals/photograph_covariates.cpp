@@ -6,7 +6,7 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/photograph_silhouette.h"
-#include "server/image/shading.h"
+#include "server/image/scene/shading.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {

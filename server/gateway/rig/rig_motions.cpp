@@ -10,7 +10,7 @@
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/run_command.h"
 #include "server/geometry/pose.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 
 namespace touchstone::gateway {
 namespace {

@@ -4,7 +4,7 @@
 #include "server/base/status.h"
 #include "server/base/text/over_limit.h"
 #include "server/geometry/pose.h"
-#include "server/image/renderer.h"
+#include "server/image/renderers/renderer.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
 #include "server/service/gateway/rig_service.h"

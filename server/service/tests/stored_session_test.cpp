@@ -8,7 +8,7 @@
 
 #include "server/base/test_folder.h"
 #include "server/base/text/text.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/service/calls/evidence.h"
 #include "server/service/core/resources.h"
 #include "server/service/sessions/session_store.h"

@@ -8,7 +8,7 @@
 #include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/csv/csv_fields.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/images_csv.h"

@@ -12,7 +12,7 @@
 #include "server/base/test_folder.h"
 #include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/images_csv.h"
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "tests/rig/controller/unread.h"
 
 namespace touchstone::rig {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "server/geometry/supershape.h"
-#include "server/image/renderer.h"
+#include "server/image/renderers/renderer.h"
 #include "tests/rig/world/camera_light.h"
 
 namespace touchstone::rig {
