@@ -20,7 +20,7 @@
 #include "server/base/process/version.h"
 #include "server/base/status.h"
 #include "server/diagnosis/boards/board_pictures.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/renderers/renderer.h"
 #include "server/service/channel/channel.h"
 

@@ -5,7 +5,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/outlines.h"
 #include "server/geometry/pose.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/session/recorded/base_pose.h"
 
 namespace touchstone::workbench {

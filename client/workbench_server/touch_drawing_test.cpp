@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::workbench {
 namespace {

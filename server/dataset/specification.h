@@ -9,7 +9,7 @@
 
 #include <absl/status/status.h>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/renderers/renderer.h"
 #include "server/model/model.h"
 #include "server/touch/plan.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/base/threads/thread_pool.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"
 #include "server/session/measurements/measurement_set.h"

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 #include "server/image/image.h"
 #include "server/image/photograph/photograph.h"
 #include "server/session/journal/journal.h"

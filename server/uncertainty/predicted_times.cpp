@@ -7,7 +7,7 @@
 #include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 #include "server/effects/contact/surface_departure.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/value_names.h"
 
 namespace touchstone::uncertainty {

@@ -12,7 +12,7 @@
 #include "server/gateway/arm/primary_message.h"
 #include "server/gateway/arm/rtde_message.h"
 #include "server/gateway/calibration/calibration.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/model/model.h"
 #include "server/model/surface_map_file.h"
 #include "server/service/options/option_table.h"

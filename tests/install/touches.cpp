@@ -5,7 +5,7 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/service/core/convert.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"

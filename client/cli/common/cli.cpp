@@ -23,7 +23,7 @@
 #include "server/base/text/printable.h"
 #include "server/base/text/text.h"
 #include "server/base/text/whole_number.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 
 namespace touchstone::cli {
 namespace {

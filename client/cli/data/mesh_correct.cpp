@@ -10,8 +10,8 @@
 #include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/contact/surface_map.h"
-#include "server/geometry/displace.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/displace.h"
 #include "server/model/surface_map_file.h"
 
 namespace touchstone::cli {

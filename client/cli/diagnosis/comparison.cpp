@@ -18,7 +18,7 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/calls/evidence.h"
 #include "server/session/measurements/touch_content.h"

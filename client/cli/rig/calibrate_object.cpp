@@ -11,8 +11,8 @@
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/object_registration.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/service/core/convert.h"
 
 namespace touchstone::cli {

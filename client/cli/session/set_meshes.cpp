@@ -9,7 +9,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 
 namespace touchstone::cli {
 namespace {

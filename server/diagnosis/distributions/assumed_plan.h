@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/session/measurements/measurement_set.h"
 #include "server/touch/plan.h"
 

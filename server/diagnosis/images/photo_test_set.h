@@ -14,7 +14,7 @@
 #include "server/base/numbers/random.h"
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {

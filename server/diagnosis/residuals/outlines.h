@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/diagnosis/touches/observations.h"
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 
 namespace touchstone::diagnosis::residuals {
 

@@ -12,7 +12,7 @@
 #include "server/effects/contact/smooth_field.h"
 #include "server/effects/contact/surface_departure.h"
 #include "server/effects/define_effect.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::effects {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "server/base/numbers/random.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 #include "server/effects/effect_test_batch.h"
 

@@ -11,7 +11,7 @@
 #include "server/base/numbers/matern.h"
 #include "server/base/units.h"
 #include "server/effects/contact/surface_departure.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::effects {
 namespace {

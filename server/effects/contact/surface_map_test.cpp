@@ -7,7 +7,7 @@
 
 #include "server/effects/all_effects.h"
 #include "server/effects/effect_test_batch.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
 #include "server/model/surface_map_file.h"
 

@@ -29,7 +29,7 @@
 #include "server/gateway/rig/heartbeats.h"
 #include "server/gateway/rig/session_clock.h"
 #include "server/gateway/rig/unwritten_outcomes.h"
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 #include "server/session/journal/journal.h"
 #include "server/source/rig_device.h"
 

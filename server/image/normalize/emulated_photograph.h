@@ -11,7 +11,7 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/units.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/normalize/normalize_ground.h"
 #include "server/image/renderers/renderer.h"
 #include "server/image/scene/shading.h"

@@ -17,7 +17,7 @@
 #include "server/base/sanitizers.h"
 #include "server/base/test_paths.h"
 #include "server/base/test_tier.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/image/encoding/encode.h"
 #include "server/image/normalize/emulated_photograph.h"
 #include "server/image/normalize/normalize_region.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/effects/photo_settings.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/photograph/photo_lens.h"
 #include "server/image/renderers/cpu_frame.h"
 #include "server/image/scene/shading_mesh.h"

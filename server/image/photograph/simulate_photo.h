@@ -13,7 +13,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/effects/photo_settings.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/image.h"
 #include "server/image/photograph/photograph.h"
 #include "server/image/scene/view.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/renderers/cpu_kernels.h"
 #include "server/image/renderers/renderer.h"
 #include "server/image/scene/shading.h"

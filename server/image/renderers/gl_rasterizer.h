@@ -12,7 +12,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/image.h"
 #include "server/image/scene/shading_mesh.h"
 

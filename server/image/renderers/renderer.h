@@ -11,7 +11,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/image.h"
 
 namespace touchstone::image {

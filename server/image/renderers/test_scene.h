@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/units.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/renderers/renderer.h"
 #include "server/image/scene/view.h"
 

@@ -17,7 +17,7 @@
 
 #include <array>
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 #include "server/image/image.h"
 #include "server/image/scene/view.h"
 

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::image {
 

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 #include "server/image/image.h"
 
 namespace touchstone::image {

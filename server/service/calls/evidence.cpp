@@ -10,7 +10,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/sent_model.h"
 #include "server/service/sessions/measured_set_message.h"

@@ -10,7 +10,7 @@
 #include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/model/model.h"
 #include "server/session/measurements/measurement_set.h"
 

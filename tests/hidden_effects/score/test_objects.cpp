@@ -10,8 +10,8 @@
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::hidden {
 

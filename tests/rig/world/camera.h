@@ -19,7 +19,7 @@
 
 #include <Eigen/Geometry>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/renderers/renderer.h"
 #include "tests/rig/world.h"
 #include "tests/rig/world/camera_light.h"

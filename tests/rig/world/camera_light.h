@@ -8,7 +8,7 @@
 
 #include <Eigen/Geometry>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/image/scene/shading_mesh.h"
 
 namespace touchstone::rig {

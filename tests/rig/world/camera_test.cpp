@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "tests/rig/controller/net.h"
 
 namespace touchstone::rig {
