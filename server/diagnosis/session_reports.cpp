@@ -9,7 +9,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/early_verdicts.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/report/from_sessions.h"
 #include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/report/join.h"

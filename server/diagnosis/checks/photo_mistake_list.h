@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set_fix.h"
 

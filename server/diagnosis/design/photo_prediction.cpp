@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/parameterization.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/images/photo_rows.h"
 

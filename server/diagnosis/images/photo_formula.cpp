@@ -8,7 +8,7 @@
 #include <cstdlib>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_rest_sums.h"
 #include "server/diagnosis/images/photo_term_scores.h"
 #include "server/diagnosis/images/photo_terms.h"

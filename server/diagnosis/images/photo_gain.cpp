@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/step_order.h"
+#include "server/diagnosis/engine/ladder/step_order.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_search.h"

@@ -7,8 +7,8 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/candidate_ranking.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/competition/candidate_ranking.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_budget.h"
 #include "server/diagnosis/images/photo_covariates.h"
 #include "server/diagnosis/images/photo_formula.h"

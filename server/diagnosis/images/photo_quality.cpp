@@ -9,7 +9,7 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/numbers/normal.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/images/photo_cells.h"
 
 namespace touchstone::diagnosis::images {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/parameterization.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_view.h"
 

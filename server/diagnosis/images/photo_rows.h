@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/observation_model.h"
-#include "server/diagnosis/engine/smooth_error.h"
+#include "server/diagnosis/engine/fit/observation_model.h"
+#include "server/diagnosis/engine/fit/smooth_error.h"
 #include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/images/photographs.h"
 

@@ -5,7 +5,7 @@
 #include <iterator>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/effects/all_effects.h"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/images/photo_rows.h"
 #include "server/diagnosis/input.h"
 

@@ -9,7 +9,7 @@
 #include <functional>
 #include <numeric>
 
-#include "server/diagnosis/engine/uneven_parts.h"
+#include "server/diagnosis/engine/competition/uneven_parts.h"
 #include "server/diagnosis/images/photo_cells.h"
 
 namespace touchstone::diagnosis::images {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/images/photographs.h"
 
 namespace touchstone::diagnosis::images {

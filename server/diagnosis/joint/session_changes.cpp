@@ -7,7 +7,7 @@
 
 #include "server/base/numbers/normal.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 
 namespace touchstone::diagnosis::report {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/parameter_estimate.h"
+#include "server/diagnosis/engine/fit/parameter_estimate.h"
 #include "server/diagnosis/report/diagnosis.h"
 #include "touchstone/v1/diagnosis.pb.h"
 

@@ -5,7 +5,7 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

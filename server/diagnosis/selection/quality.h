@@ -1,7 +1,7 @@
 // How good a model is: error, error on touches left out, lack of fit.
 #pragma once
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/selection/selection.h"
 
 namespace touchstone::diagnosis::selection {

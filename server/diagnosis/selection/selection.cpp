@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/effect_columns.h"

@@ -10,7 +10,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/selection/curves/formula_terms.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"

@@ -1,4 +1,4 @@
-#include "server/diagnosis/engine/likelihood.h"
+#include "server/diagnosis/engine/fit/likelihood.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -7,7 +7,7 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/engine/laplace_evidence.h"
+#include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/candidate_course.h"
 #include "server/diagnosis/selection/curves/held_out_curve.h"
 #include "server/diagnosis/selection/curves/session_slots.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 
 namespace touchstone::diagnosis::selection {
 

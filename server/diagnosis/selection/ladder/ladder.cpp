@@ -9,9 +9,9 @@
 
 #include "server/base/status.h"
 #include "server/base/text/readable_time.h"
-#include "server/diagnosis/engine/candidate_ranking.h"
+#include "server/diagnosis/engine/competition/candidate_ranking.h"
 #include "server/diagnosis/engine/findings.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/ladder/climb.h"
 #include "server/diagnosis/selection/ladder/doubts.h"
 #include "server/diagnosis/selection/ladder/hypotheses.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/base/numbers/decompositions.h"
-#include "server/diagnosis/engine/support_points.h"
+#include "server/diagnosis/engine/fit/support_points.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::selection {
