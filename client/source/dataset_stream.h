@@ -11,9 +11,9 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/support/sync_stream.h>
 
-#include "client/source/batch.h"
-#include "client/source/connection.h"
-#include "client/source/lease_keeper.h"
+#include "client/source/connection/connection.h"
+#include "client/source/connection/lease_keeper.h"
+#include "client/source/dataset/batch.h"
 #include "server/base/threads/clock.h"
 
 namespace touchstone::client {

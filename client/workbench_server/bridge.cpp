@@ -14,7 +14,7 @@
 #include <boost/beast/http/field.hpp>
 #include <boost/beast/http/verb.hpp>
 
-#include "client/source/errors.h"
+#include "client/source/connection/errors.h"
 #include "client/workbench_server/grpc_web.h"
 
 namespace touchstone::workbench {

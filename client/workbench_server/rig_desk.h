@@ -15,7 +15,7 @@
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
-#include "client/source/leased_source.h"
+#include "client/source/connection/leased_source.h"
 #include "client/workbench_server/pages.h"
 #include "client/workbench_server/touch_run.h"
 #include "client/workbench_server/watchers.h"

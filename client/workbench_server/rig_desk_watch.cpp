@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "client/source/rig_words.h"
+#include "client/source/plans/rig_words.h"
 #include "client/workbench_server/rig_desk.h"
 #include "server/base/status.h"
 #include "server/base/units.h"

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/source/rig_plan.h"
+#include "client/source/plans/rig_plan.h"
 
 namespace touchstone::workbench {
 

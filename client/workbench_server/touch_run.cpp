@@ -7,10 +7,10 @@
 #include <limits>
 #include <numeric>
 
-#include "client/source/measurement_csv.h"
-#include "client/source/plan_expansion.h"
-#include "client/source/rig_words.h"
-#include "client/source/touch_ids.h"
+#include "client/source/dataset/measurement_csv.h"
+#include "client/source/plans/plan_expansion.h"
+#include "client/source/plans/rig_words.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 

@@ -9,8 +9,8 @@
 #include <absl/status/statusor.h>
 #include <nlohmann/json.hpp>
 
-#include "client/source/leased_source.h"
-#include "client/source/rig_plan.h"
+#include "client/source/connection/leased_source.h"
+#include "client/source/plans/rig_plan.h"
 #include "client/workbench_server/touch_drawing.h"
 
 namespace touchstone::workbench {

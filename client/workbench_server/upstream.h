@@ -11,7 +11,7 @@
 
 #include <grpcpp/channel.h>
 
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 
 namespace touchstone::workbench {
 

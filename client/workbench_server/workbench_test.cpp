@@ -10,7 +10,7 @@
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 #include "client/workbench/page.h"
 #include "client/workbench_server/example.h"
 #include "client/workbench_server/grpc_web.h"

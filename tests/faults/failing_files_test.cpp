@@ -1,6 +1,6 @@
 // Every step that writes a file, with the disk failing at each of its calls in turn, and killed before each: what it writes is
 // whole or as it was before, and its status says which. A journal that stays open: failing_journal_test.cpp.
-#include "client/source/synced_file.h"
+#include "client/source/dataset/synced_file.h"
 #include "server/base/files/file_writer.h"
 #include "server/base/files/new_file.h"
 #include "server/base/test_tier.h"

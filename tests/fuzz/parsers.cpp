@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "client/source/dataset_manifest.h"
+#include "client/source/dataset/dataset_manifest.h"
 #include "server/base/test_folder.h"
 #include "server/effects/all_effects.h"
 #include "server/effects/formula/formula_program.h"

@@ -1,7 +1,7 @@
 // touches PLAN.csv MODEL.yaml MESH SEED: the measurement file that `touchstone touch` prints for the same.
 #include <iostream>
 
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/effects/all_effects.h"

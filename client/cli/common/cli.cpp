@@ -17,7 +17,7 @@
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/common/provenance.h"
 #include "client/cli/common/terminal.h"
-#include "client/source/lease_keeper.h"
+#include "client/source/connection/lease_keeper.h"
 #include "server/base/process/version.h"
 #include "server/base/status.h"
 #include "server/base/text/printable.h"

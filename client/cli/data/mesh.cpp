@@ -4,7 +4,7 @@
 #include <absl/strings/ascii.h>
 
 #include "client/cli/options/mesh_options.h"
-#include "client/source/lab_units.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/geometry/files/mesh_file.h"

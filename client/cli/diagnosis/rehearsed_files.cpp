@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "client/cli/common/child_program.h"
-#include "client/source/session_parts.h"
+#include "client/source/plans/session_parts.h"
 #include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"

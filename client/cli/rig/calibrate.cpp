@@ -7,7 +7,7 @@
 #include "client/cli/common/terminal.h"
 #include "client/cli/rig/calibrate.h"
 #include "client/cli/session/journal_session.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/base/units.h"

@@ -5,7 +5,7 @@
 
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/rig/calibrate.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/base/units.h"

@@ -5,7 +5,7 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/rig/rig.h"
 #include "client/report/path_drawing.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/geometry/pose.h"

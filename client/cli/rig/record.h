@@ -9,7 +9,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 #include "server/session/journal/journal.h"
 #include "touchstone/v1/rig.pb.h"
 #include "touchstone/v1/types.pb.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "client/source/synced_file.h"
+#include "client/source/dataset/synced_file.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/image/photograph/photograph.h"

@@ -8,8 +8,8 @@
 
 #include "client/cli/common/interrupt.h"
 #include "client/cli/common/output_file.h"
-#include "client/source/errors.h"
-#include "client/source/image_set_files.h"
+#include "client/source/connection/errors.h"
+#include "client/source/plans/image_set_files.h"
 #include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"

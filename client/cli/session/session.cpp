@@ -14,7 +14,7 @@
 #include "client/cli/session/journal_session.h"
 #include "client/cli/session/trash.h"
 #include "client/cli/session/verify.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/base/units.h"
