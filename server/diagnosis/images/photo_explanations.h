@@ -2,7 +2,7 @@
 #pragma once
 
 #include "server/diagnosis/engine/competition/competition.h"
-#include "server/diagnosis/images/pixel_noise.h"
+#include "server/diagnosis/images/pixels/pixel_noise.h"
 
 namespace touchstone::diagnosis::images {
 

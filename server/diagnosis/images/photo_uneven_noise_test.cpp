@@ -1,5 +1,5 @@
 // Noise of pixels that differs between parts of a set is told as that, and no effect is named for it with confidence.
-#include "server/diagnosis/images/photo_uneven_noise.h"
+#include "server/diagnosis/images/rows/photo_uneven_noise.h"
 
 #include <functional>
 

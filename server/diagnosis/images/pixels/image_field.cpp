@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/image_field.h"
+#include "server/diagnosis/images/pixels/image_field.h"
 
 #include <absl/strings/str_cat.h>
 

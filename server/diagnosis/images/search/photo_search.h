@@ -7,7 +7,7 @@
 
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/fit/fit.h"
-#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/images/rows/photo_rows.h"
 #include "server/diagnosis/input.h"
 
 namespace touchstone::diagnosis::images {

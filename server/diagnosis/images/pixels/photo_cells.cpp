@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 
 #include <algorithm>
 #include <cmath>

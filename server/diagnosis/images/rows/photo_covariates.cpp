@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_covariates.h"
+#include "server/diagnosis/images/rows/photo_covariates.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "server/diagnosis/images/photo_rest_kinds.h"
+#include "server/diagnosis/images/rows/photo_rest_kinds.h"
 
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_test_set.h"
+#include "server/diagnosis/images/search/photo_quality.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_terms.h"
+#include "server/diagnosis/images/terms/photo_terms.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_term_scores.h"
+#include "server/diagnosis/images/terms/photo_term_scores.h"
 
 #include <Eigen/Cholesky>
 

@@ -8,9 +8,9 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/images/photo_term_scores.h"
-#include "server/diagnosis/images/photo_terms.h"
 #include "server/diagnosis/images/photographs.h"
+#include "server/diagnosis/images/terms/photo_term_scores.h"
+#include "server/diagnosis/images/terms/photo_terms.h"
 
 namespace touchstone::diagnosis::images {
 

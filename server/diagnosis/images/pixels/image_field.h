@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 #include "server/model/effect.h"
 
 namespace touchstone::diagnosis::images {

@@ -14,8 +14,8 @@
 
 #include "server/diagnosis/engine/fit/observation_model.h"
 #include "server/diagnosis/engine/fit/smooth_error.h"
-#include "server/diagnosis/images/photo_cells.h"
 #include "server/diagnosis/images/photographs.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 
 namespace touchstone::diagnosis::images {
 

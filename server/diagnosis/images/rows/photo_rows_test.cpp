@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/images/rows/photo_rows.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <map>
 
 #include "server/base/status.h"
-#include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/search/photo_quality.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/images/pixel_noise.h"
+#include "server/diagnosis/images/pixels/pixel_noise.h"
 
 namespace touchstone::diagnosis::images {
 

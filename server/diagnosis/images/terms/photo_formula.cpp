@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_formula.h"
+#include "server/diagnosis/images/terms/photo_formula.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -9,9 +9,9 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
-#include "server/diagnosis/images/photo_rest_sums.h"
-#include "server/diagnosis/images/photo_term_scores.h"
-#include "server/diagnosis/images/photo_terms.h"
+#include "server/diagnosis/images/terms/photo_rest_sums.h"
+#include "server/diagnosis/images/terms/photo_term_scores.h"
+#include "server/diagnosis/images/terms/photo_terms.h"
 #include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::images {

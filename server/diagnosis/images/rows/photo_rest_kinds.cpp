@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_rest_kinds.h"
+#include "server/diagnosis/images/rows/photo_rest_kinds.h"
 
 #include <Eigen/Cholesky>
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/search/photo_quality.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
-#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

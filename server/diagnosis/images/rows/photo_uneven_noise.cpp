@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_uneven_noise.h"
+#include "server/diagnosis/images/rows/photo_uneven_noise.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "server/diagnosis/engine/competition/uneven_parts.h"
-#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,9 +1,9 @@
-#include "server/diagnosis/images/photo_rest_sums.h"
+#include "server/diagnosis/images/terms/photo_rest_sums.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/diagnosis/images/photo_cells.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_flow.h"
+#include "server/diagnosis/images/rows/photo_flow.h"
 
 #include <algorithm>
 #include <cmath>

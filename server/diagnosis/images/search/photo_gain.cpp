@@ -9,9 +9,9 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
-#include "server/diagnosis/images/image_field.h"
-#include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/pixels/image_field.h"
+#include "server/diagnosis/images/search/photo_quality.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/pixel_noise.h"
+#include "server/diagnosis/images/pixels/pixel_noise.h"
 
 #include <Eigen/Core>
 

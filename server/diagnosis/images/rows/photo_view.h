@@ -4,7 +4,7 @@
 #include <mutex>
 #include <vector>
 
-#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/images/rows/photo_rows.h"
 
 namespace touchstone::diagnosis::images {
 

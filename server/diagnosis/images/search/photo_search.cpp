@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
-#include "server/diagnosis/images/image_field.h"
-#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/pixels/image_field.h"
+#include "server/diagnosis/images/search/photo_quality.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::images {

@@ -1,12 +1,12 @@
-#include "server/diagnosis/images/photo_view.h"
+#include "server/diagnosis/images/rows/photo_view.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/parameterization.h"
-#include "server/diagnosis/images/image_field.h"
-#include "server/diagnosis/images/photo_flow.h"
+#include "server/diagnosis/images/pixels/image_field.h"
+#include "server/diagnosis/images/rows/photo_flow.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::images {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/images/photo_flow.h"
+#include "server/diagnosis/images/rows/photo_flow.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_test_set.h"
 #include "server/diagnosis/images/photographs.h"
+#include "server/diagnosis/images/search/photo_quality.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

@@ -1,9 +1,9 @@
 // How good a model of photographs is: errors over all pixels, the floor below which none can go, lack of fit.
 #pragma once
 
-#include "server/diagnosis/images/photo_search.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/images/photographs.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 
