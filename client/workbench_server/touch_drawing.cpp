@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/diagnosis/residuals/outlines.h"
+#include "server/diagnosis/residuals/touches/outlines.h"
 #include "server/geometry/pose.h"
 #include "server/geometry/shapes/supershape.h"
 #include "server/session/recorded/base_pose.h"

@@ -12,7 +12,7 @@
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/report/from_photographs.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/diagnosis/residuals/photographs/describe_photographs.h"
 
 namespace touchstone::diagnosis {
 namespace {

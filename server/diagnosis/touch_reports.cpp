@@ -20,7 +20,7 @@
 #include "server/diagnosis/report/from_distributions.h"
 #include "server/diagnosis/report/from_touches.h"
 #include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/residuals/describe_residuals.h"
+#include "server/diagnosis/residuals/touches/describe_residuals.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"

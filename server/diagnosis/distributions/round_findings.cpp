@@ -9,7 +9,7 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/text/readable_time.h"
-#include "server/diagnosis/residuals/permutation.h"
+#include "server/diagnosis/residuals/distribution/permutation.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::distributions {
