@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/image/encoding/encode.h"
-#include "tests/rig/controller/unread.h"
+#include "tests/rig/controller/network/unread.h"
 
 namespace touchstone::rig {
 namespace {

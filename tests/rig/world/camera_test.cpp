@@ -12,7 +12,7 @@
 #include <numeric>
 
 #include "server/geometry/shapes/supershape.h"
-#include "tests/rig/controller/net.h"
+#include "tests/rig/controller/network/net.h"
 
 namespace touchstone::rig {
 namespace {
