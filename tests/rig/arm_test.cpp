@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "server/base/test_folder.h"
-#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/arm/motion/motion_planner.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "tests/rig/controller.h"
 #include "tests/rig/controller/protocol/test_client.h"

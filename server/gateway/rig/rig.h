@@ -20,7 +20,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/gateway/arm/arm.h"
-#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/arm/motion/motion_planner.h"
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"

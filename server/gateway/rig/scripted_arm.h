@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "server/gateway/arm/arm.h"
-#include "server/gateway/arm/kinematics.h"
-#include "server/gateway/arm/motion_limits.h"
+#include "server/gateway/arm/kinematics/kinematics.h"
+#include "server/gateway/arm/kinematics/motion_limits.h"
 
 namespace touchstone::gateway {
 
