@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/checks/photographs/photo_mistakes.h"
 #include "server/diagnosis/design/propose_photographs.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/report/from_photographs.h"

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "server/diagnosis/checks/photo_mistake_list.h"
+#include "server/diagnosis/checks/photographs/photo_mistake_list.h"
 #include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::checks {

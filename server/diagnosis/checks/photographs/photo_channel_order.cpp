@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/photo_channel_order.h"
+#include "server/diagnosis/checks/photographs/photo_channel_order.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/checks/photographs/photo_mistakes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/odd_pictures.h"
+#include "server/diagnosis/checks/photographs/odd_pictures.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/stale_rows.h"
+#include "server/diagnosis/checks/rows/stale_rows.h"
 
 #include "server/session/measurements/measurement_fix.h"
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/round_speed.h"
+#include "server/diagnosis/checks/rows/round_speed.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/duplicates.h"
+#include "server/diagnosis/checks/rows/duplicates.h"
 
 #include <algorithm>
 #include <cmath>

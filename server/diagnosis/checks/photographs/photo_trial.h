@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/checks/photographs/photo_mistakes.h"
 
 namespace touchstone::diagnosis::checks {
 

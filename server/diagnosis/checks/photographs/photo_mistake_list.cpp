@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/photo_mistake_list.h"
+#include "server/diagnosis/checks/photographs/photo_mistake_list.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>

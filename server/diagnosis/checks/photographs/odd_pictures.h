@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "server/diagnosis/checks/photo_mistake_list.h"
-#include "server/diagnosis/checks/photo_trial.h"
+#include "server/diagnosis/checks/photographs/photo_mistake_list.h"
+#include "server/diagnosis/checks/photographs/photo_trial.h"
 
 namespace touchstone::diagnosis::checks {
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/checks/photographs/photo_mistakes.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -8,10 +8,10 @@
 #include <cmath>
 
 #include "server/base/text/text.h"
-#include "server/diagnosis/checks/odd_pictures.h"
-#include "server/diagnosis/checks/photo_channel_order.h"
-#include "server/diagnosis/checks/photo_mistake_list.h"
-#include "server/diagnosis/checks/photo_trial.h"
+#include "server/diagnosis/checks/photographs/odd_pictures.h"
+#include "server/diagnosis/checks/photographs/photo_channel_order.h"
+#include "server/diagnosis/checks/photographs/photo_mistake_list.h"
+#include "server/diagnosis/checks/photographs/photo_trial.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/checks/photo_trial.h"
+#include "server/diagnosis/checks/photographs/photo_trial.h"
 
 #include <algorithm>
 #include <array>
