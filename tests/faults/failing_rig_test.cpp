@@ -11,7 +11,7 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/rig/idle_effector.h"
 #include "server/gateway/rig/rig.h"
-#include "server/gateway/rig/scripted_arm.h"
+#include "server/gateway/rig/watches/scripted_arm.h"
 #include "tests/faults/failing_test.h"
 
 namespace touchstone::faults {

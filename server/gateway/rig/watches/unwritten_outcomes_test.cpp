@@ -1,4 +1,4 @@
-#include "server/gateway/rig/unwritten_outcomes.h"
+#include "server/gateway/rig/watches/unwritten_outcomes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-#include "server/gateway/rig/approach_fit.h"
+#include "server/gateway/rig/results/approach_fit.h"
 
 namespace touchstone::gateway {
 namespace {

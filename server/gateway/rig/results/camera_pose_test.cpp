@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/gateway/rig/camera_pose.h"
+#include "server/gateway/rig/results/camera_pose.h"
 
 namespace touchstone::gateway {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/rig/touch_result.h"
+#include "server/gateway/rig/results/touch_result.h"
 #include "touchstone/v1/types.pb.h"
 
 namespace touchstone::gateway {

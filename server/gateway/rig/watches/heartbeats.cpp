@@ -1,4 +1,4 @@
-#include "server/gateway/rig/heartbeats.h"
+#include "server/gateway/rig/watches/heartbeats.h"
 
 #include <utility>
 

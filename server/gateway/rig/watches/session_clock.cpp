@@ -1,4 +1,4 @@
-#include "server/gateway/rig/session_clock.h"
+#include "server/gateway/rig/watches/session_clock.h"
 
 #include <time.h>
 

@@ -1,4 +1,4 @@
-#include "server/gateway/rig/camera_pose.h"
+#include "server/gateway/rig/results/camera_pose.h"
 
 #include <absl/strings/str_format.h>
 

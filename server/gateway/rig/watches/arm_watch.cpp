@@ -1,4 +1,4 @@
-#include "server/gateway/rig/arm_watch.h"
+#include "server/gateway/rig/watches/arm_watch.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/gateway/rig/force_guard.h"
+#include "server/gateway/rig/watches/force_guard.h"
 
 #include <absl/strings/str_format.h>
 

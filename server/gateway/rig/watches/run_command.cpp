@@ -1,4 +1,4 @@
-#include "server/gateway/rig/run_command.h"
+#include "server/gateway/rig/watches/run_command.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>

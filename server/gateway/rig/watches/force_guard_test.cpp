@@ -1,11 +1,11 @@
-#include "server/gateway/rig/force_guard.h"
+#include "server/gateway/rig/watches/force_guard.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "server/gateway/rig/scripted_arm.h"
+#include "server/gateway/rig/watches/scripted_arm.h"
 
 namespace touchstone::gateway {
 namespace {

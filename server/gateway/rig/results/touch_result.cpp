@@ -1,4 +1,4 @@
-#include "server/gateway/rig/touch_result.h"
+#include "server/gateway/rig/results/touch_result.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -9,8 +9,8 @@
 #include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/gateway/rig/approach_fit.h"
-#include "server/gateway/rig/touch_series.h"
+#include "server/gateway/rig/results/approach_fit.h"
+#include "server/gateway/rig/results/touch_series.h"
 #include "server/geometry/pose.h"
 
 namespace touchstone::gateway {

@@ -1,10 +1,10 @@
-#include "server/gateway/rig/arm_watch.h"
+#include "server/gateway/rig/watches/arm_watch.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/gateway/arm/ur_modes.h"
-#include "server/gateway/rig/scripted_arm.h"
+#include "server/gateway/rig/watches/scripted_arm.h"
 
 namespace touchstone::gateway {
 namespace {

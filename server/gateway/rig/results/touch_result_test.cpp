@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "server/gateway/rig/touch_result.h"
-#include "server/gateway/rig/touch_series.h"
+#include "server/gateway/rig/results/touch_result.h"
+#include "server/gateway/rig/results/touch_series.h"
 
 namespace touchstone::gateway {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/gateway/rig/approach_fit.h"
+#include "server/gateway/rig/results/approach_fit.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -1,4 +1,4 @@
-#include "server/gateway/rig/run_command.h"
+#include "server/gateway/rig/watches/run_command.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
