@@ -59,7 +59,7 @@ std::string Shown(absl::string_view text) {
   return Printable(text, std::string::npos, /*keep_lines=*/true);
 }
 
-// The same with the styles that reports have on a terminal (client/report/text_layout.cpp).
+// The same with the styles that reports have on a terminal (client/report/words/text_layout.cpp).
 std::string ShownWithStyles(absl::string_view text) {
   std::string shown = Shown(text);
   for (const char* style : {"[0m", "[1m", "[2m", "[32m", "[33m", "[36m"})

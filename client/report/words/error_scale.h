@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "client/report/words.h"
+#include "client/report/words/words.h"
 
 namespace touchstone::client {
 

@@ -1,8 +1,8 @@
 // Check the data, in the terminal.
 #include <absl/strings/str_cat.h>
 
-#include "client/report/error_scale.h"
-#include "client/report/terminal_parts.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/error_scale.h"
 
 namespace touchstone::client {
 

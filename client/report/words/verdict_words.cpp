@@ -9,7 +9,7 @@
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
-#include "client/report/error_scale.h"
+#include "client/report/words/error_scale.h"
 
 namespace touchstone::client {
 

@@ -4,8 +4,8 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "client/report/error_scale.h"
-#include "client/report/terminal_parts.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/error_scale.h"
 
 namespace touchstone::client {
 namespace {

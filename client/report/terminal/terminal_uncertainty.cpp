@@ -1,11 +1,11 @@
 // How well a model predicts, in the terminal.
 #include <absl/strings/str_cat.h>
 
-#include "client/report/error_scale.h"
 #include "client/report/report.h"
-#include "client/report/terminal_parts.h"
-#include "client/report/text_layout.h"
-#include "client/report/words.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/error_scale.h"
+#include "client/report/words/text_layout.h"
+#include "client/report/words/words.h"
 
 namespace touchstone::client {
 namespace {

@@ -5,7 +5,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
-#include "client/report/words.h"
+#include "client/report/words/words.h"
 
 namespace touchstone::client {
 

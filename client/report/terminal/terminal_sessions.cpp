@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/report/error_scale.h"
 #include "client/report/report.h"
-#include "client/report/terminal_parts.h"
-#include "client/report/words.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/error_scale.h"
+#include "client/report/words/words.h"
 
 namespace touchstone::client {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "client/report/report.h"
 #include "client/report/sample_reports.h"
-#include "client/report/text_layout.h"
+#include "client/report/words/text_layout.h"
 
 namespace touchstone::client {
 namespace {

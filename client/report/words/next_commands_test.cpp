@@ -1,4 +1,4 @@
-#include "client/report/next_commands.h"
+#include "client/report/words/next_commands.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "client/report/text_layout.h"
+#include "client/report/words/text_layout.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "client/report/joint.h"
+#include "client/report/words/joint.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "client/report/error_scale.h"
+#include "client/report/words/error_scale.h"
 
 namespace touchstone::client {
 namespace {

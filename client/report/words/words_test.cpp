@@ -1,4 +1,4 @@
-#include "client/report/words.h"
+#include "client/report/words/words.h"
 
 #include <cmath>
 
@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "client/report/error_scale.h"
 #include "client/report/report.h"
 #include "client/report/sample_reports.h"
+#include "client/report/words/error_scale.h"
 
 namespace touchstone::client {
 namespace {

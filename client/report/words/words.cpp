@@ -1,4 +1,4 @@
-#include "client/report/words.h"
+#include "client/report/words/words.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@
 #include <absl/strings/str_replace.h>
 #include <absl/strings/strip.h>
 
-#include "client/report/error_scale.h"
+#include "client/report/words/error_scale.h"
 #include "server/base/files/file_label.h"
 #include "server/base/units.h"
 

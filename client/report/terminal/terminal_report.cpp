@@ -7,10 +7,10 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
-#include "client/report/error_scale.h"
-#include "client/report/joint.h"
 #include "client/report/report.h"
-#include "client/report/terminal_parts.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/error_scale.h"
+#include "client/report/words/joint.h"
 
 namespace touchstone::client {
 namespace {

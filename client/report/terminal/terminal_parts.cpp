@@ -1,4 +1,4 @@
-#include "client/report/terminal_parts.h"
+#include "client/report/terminal/terminal_parts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
 
-#include "client/report/error_scale.h"
-#include "client/report/next_commands.h"
+#include "client/report/words/error_scale.h"
+#include "client/report/words/next_commands.h"
 
 namespace touchstone::client {
 namespace {

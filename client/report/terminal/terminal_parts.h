@@ -1,7 +1,7 @@
 // The parts of the terminal report that say why and what to do. Each adds nothing if the report has nothing.
 #pragma once
 
-#include "client/report/text_layout.h"
+#include "client/report/words/text_layout.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::client {

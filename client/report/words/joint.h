@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "client/report/text_layout.h"
+#include "client/report/words/text_layout.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::client {

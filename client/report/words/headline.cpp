@@ -5,8 +5,8 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "client/report/error_scale.h"
-#include "client/report/joint.h"
+#include "client/report/words/error_scale.h"
+#include "client/report/words/joint.h"
 
 namespace touchstone::client {
 namespace {

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "client/report/report.h"
-#include "client/report/terminal_parts.h"
-#include "client/report/words.h"
+#include "client/report/terminal/terminal_parts.h"
+#include "client/report/words/words.h"
 
 namespace touchstone::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/report/error_scale.h"
+#include "client/report/words/error_scale.h"
 
 #include <algorithm>
 #include <cmath>
