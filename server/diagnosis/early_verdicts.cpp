@@ -5,8 +5,8 @@
 #include <set>
 
 #include "server/diagnosis/how_wrong.h"
-#include "server/diagnosis/report/from_touches.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
+#include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis {
 namespace {

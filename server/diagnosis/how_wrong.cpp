@@ -1,6 +1,6 @@
 #include "server/diagnosis/how_wrong.h"
 
-#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
 #include "server/session/images/emulated.h"

@@ -8,8 +8,8 @@
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/photograph_reports.h"
-#include "server/diagnosis/report/from_photographs.h"
 #include "server/diagnosis/report/join.h"
+#include "server/diagnosis/report/kinds/from_photographs.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/touch_reports.h"
 

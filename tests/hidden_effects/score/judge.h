@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "tests/hidden_effects/score/arms.h"
 
 namespace touchstone::hidden {

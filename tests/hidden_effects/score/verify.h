@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/test_objects.h"
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/words/summary.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -9,7 +9,7 @@
 
 #include "server/base/text/readable_time.h"
 #include "server/base/units.h"
-#include "server/diagnosis/report/distributions_summary.h"
+#include "server/diagnosis/report/words/distributions_summary.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
 #include "server/session/images/emulated.h"

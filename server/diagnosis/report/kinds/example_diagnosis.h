@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
 
 namespace touchstone::diagnosis::report {
 

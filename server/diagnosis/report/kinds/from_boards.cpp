@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/from_boards.h"
+#include "server/diagnosis/report/kinds/from_boards.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/model_text.h"
+#include "server/diagnosis/report/words/model_text.h"
 
 #include <optional>
 #include <vector>

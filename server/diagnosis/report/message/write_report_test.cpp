@@ -1,9 +1,9 @@
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/report/example_diagnosis.h"
+#include "server/diagnosis/report/kinds/example_diagnosis.h"
 #include "server/model/provenance.h"
 
 namespace touchstone::diagnosis::report {

@@ -6,7 +6,7 @@
 #include <absl/strings/str_join.h>
 
 #include "server/base/files/file_label.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

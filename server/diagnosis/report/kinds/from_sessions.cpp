@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/from_sessions.h"
+#include "server/diagnosis/report/kinds/from_sessions.h"
 
 #include <algorithm>
 

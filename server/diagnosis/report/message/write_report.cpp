@@ -1,10 +1,10 @@
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 
-#include "server/diagnosis/report/message_parts.h"
-#include "server/diagnosis/report/model_text.h"
-#include "server/diagnosis/report/write_answers.h"
-#include "server/diagnosis/report/write_data_report.h"
-#include "server/diagnosis/report/write_sessions.h"
+#include "server/diagnosis/report/message/message_parts.h"
+#include "server/diagnosis/report/message/write_answers.h"
+#include "server/diagnosis/report/message/write_data_report.h"
+#include "server/diagnosis/report/message/write_sessions.h"
+#include "server/diagnosis/report/words/model_text.h"
 #include "server/uncertainty/posterior_message.h"
 
 namespace touchstone::diagnosis::report {

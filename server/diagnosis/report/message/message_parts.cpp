@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/message/message_parts.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/write_sessions.h"
+#include "server/diagnosis/report/message/write_sessions.h"
 
 #include "server/base/units.h"
 #include "server/diagnosis/joint/between_sessions.h"

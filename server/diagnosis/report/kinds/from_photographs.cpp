@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/from_photographs.h"
+#include "server/diagnosis/report/kinds/from_photographs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "server/base/check.h"
-#include "server/diagnosis/report/write_data_report.h"
+#include "server/diagnosis/report/message/write_data_report.h"
 #include "server/image/encoding/encode.h"
 
 namespace touchstone::diagnosis::report {

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/from_distributions.h"
+#include "server/diagnosis/report/kinds/from_distributions.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "server/base/units.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/words/summary.h"
 #include "server/effects/all_effects.h"
 #include "server/model/finger_name.h"
 #include "server/session/images/emulated.h"

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/distributions_summary.h"
+#include "server/diagnosis/report/words/distributions_summary.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
 
 #include <utility>
 

@@ -1,10 +1,10 @@
-#include "server/diagnosis/report/write_answers.h"
+#include "server/diagnosis/report/message/write_answers.h"
 
 #include <absl/strings/strip.h>
 
 #include "server/base/units.h"
-#include "server/diagnosis/report/from_touches.h"
-#include "server/diagnosis/report/message_parts.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
+#include "server/diagnosis/report/message/message_parts.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "server/base/units.h"
-#include "server/diagnosis/report/write_data_report.h"
+#include "server/diagnosis/report/message/write_data_report.h"
 
 namespace touchstone::diagnosis::report {
 

@@ -1,12 +1,12 @@
-#include "server/diagnosis/report/write_data_report.h"
+#include "server/diagnosis/report/message/write_data_report.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
 
-#include "server/diagnosis/report/message_parts.h"
-#include "server/diagnosis/report/write_answers.h"
+#include "server/diagnosis/report/message/message_parts.h"
+#include "server/diagnosis/report/message/write_answers.h"
 #include "server/effects/formula/formula.h"
 #include "server/model/finger_name.h"
 
