@@ -6,7 +6,7 @@
 
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/report/message/write_report.h"
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "server/effects/all_effects.h"
 #include "tests/hidden_effects/generator/rig.h"
 #include "tests/hidden_effects/generator/unlisted.h"
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/test_objects.h"
+#include "tests/hidden_effects/score/arms/test_objects.h"
 
 #include <cmath>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 
 #include <algorithm>
 #include <cmath>

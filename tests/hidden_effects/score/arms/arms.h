@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/hidden_effects/score/test_objects.h"
+#include "tests/hidden_effects/score/arms/test_objects.h"
 
 namespace touchstone::hidden {
 

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 #include <algorithm>
 #include <random>
@@ -6,7 +6,7 @@
 #include "server/base/units.h"
 #include "tests/hidden_effects/generator/rig.h"
 #include "tests/hidden_effects/generator/unlisted.h"
-#include "tests/hidden_effects/score/strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "tests/hidden_effects/generator/generate.h"
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 

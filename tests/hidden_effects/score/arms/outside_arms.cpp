@@ -2,9 +2,9 @@
 #include <utility>
 
 #include "tests/hidden_effects/generator/rig.h"
-#include "tests/hidden_effects/score/arms.h"
-#include "tests/hidden_effects/score/outside_strengths.h"
-#include "tests/hidden_effects/score/strengths.h"
+#include "tests/hidden_effects/score/arms/arms.h"
+#include "tests/hidden_effects/score/arms/outside_strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/outside_strengths.h"
+#include "tests/hidden_effects/score/arms/outside_strengths.h"
 
 #include <algorithm>
 #include <cmath>
