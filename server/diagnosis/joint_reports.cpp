@@ -3,8 +3,8 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/diagnosis/answers/early_verdicts.h"
 #include "server/diagnosis/checks/data_problems.h"
-#include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/photograph_reports.h"

@@ -11,12 +11,13 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/answers/early_verdicts.h"
+#include "server/diagnosis/answers/explain_reports.h"
+#include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
-#include "server/diagnosis/early_verdicts.h"
-#include "server/diagnosis/explain_reports.h"
-#include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/report/kinds/from_distributions.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
@@ -24,7 +25,6 @@
 #include "server/diagnosis/selection/ladder/ladder.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"
-#include "server/diagnosis/uncertainty_reports.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {

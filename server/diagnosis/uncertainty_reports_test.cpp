@@ -1,6 +1,6 @@
 // How sure a fitted model's predictions are: what a report says of that, against touches of the same rig that
 // no fit has seen.
-#include "server/diagnosis/uncertainty_reports.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "server/diagnosis/explain_reports.h"
+#include "server/diagnosis/answers/explain_reports.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -11,7 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text/readable_time.h"
 #include "server/base/units.h"
-#include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/selection/candidates.h"

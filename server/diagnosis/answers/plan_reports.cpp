@@ -1,11 +1,11 @@
-#include "server/diagnosis/plan_reports.h"
+#include "server/diagnosis/answers/plan_reports.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/selection/touch_modality.h"
 
 namespace touchstone::diagnosis {

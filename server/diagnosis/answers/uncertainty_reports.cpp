@@ -1,4 +1,4 @@
-#include "server/diagnosis/uncertainty_reports.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
@@ -9,8 +9,8 @@
 #include "server/base/status.h"
 #include "server/base/text/file_number.h"
 #include "server/base/units.h"
+#include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/design/plan_check.h"
-#include "server/diagnosis/how_wrong.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/selection/workspace.h"
 #include "server/diagnosis/touches/time_uncertainties.h"

@@ -1,10 +1,10 @@
-#include "server/diagnosis/early_verdicts.h"
+#include "server/diagnosis/answers/early_verdicts.h"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/session_posterior.h"
+#include "server/diagnosis/answers/session_posterior.h"
 
 #include "server/diagnosis/joint/between_sessions.h"
 #include "server/model/value_names.h"

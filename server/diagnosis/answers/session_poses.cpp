@@ -1,4 +1,4 @@
-#include "server/diagnosis/session_poses.h"
+#include "server/diagnosis/answers/session_poses.h"
 
 #include <algorithm>
 

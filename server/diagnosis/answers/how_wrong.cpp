@@ -1,4 +1,4 @@
-#include "server/diagnosis/how_wrong.h"
+#include "server/diagnosis/answers/how_wrong.h"
 
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/selection/quality.h"
