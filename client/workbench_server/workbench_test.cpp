@@ -13,7 +13,7 @@
 #include "client/source/connection/connection.h"
 #include "client/workbench/page.h"
 #include "client/workbench_server/example.h"
-#include "client/workbench_server/grpc_web.h"
+#include "client/workbench_server/http/grpc_web.h"
 #include "server/base/test_paths.h"
 #include "server/base/text/text.h"
 #include "server/service/rpc/server.h"

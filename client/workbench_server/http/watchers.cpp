@@ -1,4 +1,4 @@
-#include "client/workbench_server/watchers.h"
+#include "client/workbench_server/http/watchers.h"
 
 #include <absl/strings/str_cat.h>
 

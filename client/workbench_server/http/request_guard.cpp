@@ -1,4 +1,4 @@
-#include "client/workbench_server/request_guard.h"
+#include "client/workbench_server/http/request_guard.h"
 
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>

@@ -1,4 +1,4 @@
-#include "client/workbench_server/http_server.h"
+#include "client/workbench_server/http/http_server.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -20,7 +20,7 @@
 #include <thread>
 #include <vector>
 
-#include "client/workbench_server/request_guard.h"
+#include "client/workbench_server/http/request_guard.h"
 #include "server/base/process/tcp_listen.h"
 
 namespace touchstone::workbench {

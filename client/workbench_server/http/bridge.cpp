@@ -1,4 +1,4 @@
-#include "client/workbench_server/bridge.h"
+#include "client/workbench_server/http/bridge.h"
 
 #include <grpcpp/client_context.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -15,7 +15,7 @@
 #include <boost/beast/http/verb.hpp>
 
 #include "client/source/connection/errors.h"
-#include "client/workbench_server/grpc_web.h"
+#include "client/workbench_server/http/grpc_web.h"
 
 namespace touchstone::workbench {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/workbench_server/touch_drawing.h"
+#include "client/workbench_server/rig/touch_drawing.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <utility>
 
-#include "client/workbench_server/rig_desk.h"
+#include "client/workbench_server/rig/rig_desk.h"
 #include "server/base/status.h"
 #include "server/base/text/printable.h"
 #include "server/model/model.h"

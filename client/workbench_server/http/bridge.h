@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "client/workbench_server/http_server.h"
-#include "client/workbench_server/upstream.h"
+#include "client/workbench_server/http/http_server.h"
+#include "client/workbench_server/http/upstream.h"
 
 namespace touchstone::workbench {
 

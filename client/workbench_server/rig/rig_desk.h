@@ -16,9 +16,9 @@
 #include <nlohmann/json.hpp>
 
 #include "client/source/connection/leased_source.h"
+#include "client/workbench_server/http/watchers.h"
 #include "client/workbench_server/pages.h"
-#include "client/workbench_server/touch_run.h"
-#include "client/workbench_server/watchers.h"
+#include "client/workbench_server/rig/touch_run.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::workbench {

@@ -1,4 +1,4 @@
-#include "client/workbench_server/upstream.h"
+#include "client/workbench_server/http/upstream.h"
 
 #include <utility>
 

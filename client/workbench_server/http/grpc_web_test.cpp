@@ -1,4 +1,4 @@
-#include "client/workbench_server/grpc_web.h"
+#include "client/workbench_server/http/grpc_web.h"
 
 #include <gtest/gtest.h>
 

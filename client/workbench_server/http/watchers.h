@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/workbench_server/http_server.h"
+#include "client/workbench_server/http/http_server.h"
 
 namespace touchstone::workbench {
 

@@ -11,7 +11,7 @@
 
 #include "client/source/connection/leased_source.h"
 #include "client/source/plans/rig_plan.h"
-#include "client/workbench_server/touch_drawing.h"
+#include "client/workbench_server/rig/touch_drawing.h"
 
 namespace touchstone::workbench {
 

@@ -1,4 +1,4 @@
-#include "client/workbench_server/touch_run.h"
+#include "client/workbench_server/rig/touch_run.h"
 
 #include <absl/strings/str_cat.h>
 

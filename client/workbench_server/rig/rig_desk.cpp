@@ -1,4 +1,4 @@
-#include "client/workbench_server/rig_desk.h"
+#include "client/workbench_server/rig/rig_desk.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>

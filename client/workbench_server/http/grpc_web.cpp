@@ -1,4 +1,4 @@
-#include "client/workbench_server/grpc_web.h"
+#include "client/workbench_server/http/grpc_web.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>

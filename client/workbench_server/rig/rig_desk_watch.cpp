@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/source/plans/rig_words.h"
-#include "client/workbench_server/rig_desk.h"
+#include "client/workbench_server/rig/rig_desk.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 
