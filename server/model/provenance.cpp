@@ -11,7 +11,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text/text.h"
-#include "server/model/yaml_text.h"
+#include "server/model/yaml/yaml_text.h"
 
 namespace touchstone::model {
 namespace {

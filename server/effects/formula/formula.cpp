@@ -19,7 +19,7 @@
 #include "server/effects/formula/formula_program.h"
 #include "server/effects/formula/pixel_variables.h"
 #include "server/effects/formula/user_term.h"
-#include "server/model/user_term_fields.h"
+#include "server/model/fields/user_term_fields.h"
 
 namespace touchstone::effects {
 

@@ -11,7 +11,7 @@
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/geometry/pose.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::gateway::calibration {
 namespace {

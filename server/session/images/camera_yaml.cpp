@@ -7,7 +7,7 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/image/image.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 #include "server/session/csv/csv_fields.h"
 
 namespace touchstone::session {

@@ -1,4 +1,4 @@
-#include "server/model/lookup_fields.h"
+#include "server/model/fields/lookup_fields.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>

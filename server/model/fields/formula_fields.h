@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/model/user_term_fields.h"
+#include "server/model/fields/user_term_fields.h"
 
 namespace touchstone::model {
 

@@ -1,4 +1,4 @@
-#include "server/model/formula_fields.h"
+#include "server/model/fields/formula_fields.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/model/user_term_fields.h"
+#include "server/model/fields/user_term_fields.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/model/yaml_text.h"
+#include "server/model/yaml/yaml_text.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>

@@ -1,4 +1,4 @@
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
