@@ -17,7 +17,7 @@
 #include "server/diagnosis/selection/scatter/noise_memory.h"
 #include "server/diagnosis/selection/session/partial_offset.h"
 #include "server/diagnosis/selection/workspace.h"
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 
 namespace touchstone::diagnosis::selection {
 

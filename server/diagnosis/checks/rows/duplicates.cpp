@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -24,8 +24,8 @@
 #include "server/diagnosis/selection/session/round_structure.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
-#include "server/diagnosis/touches/noise_sample.h"
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {

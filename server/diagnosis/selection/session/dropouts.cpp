@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/base/numbers/distributions.h"
-#include "server/diagnosis/touches/noise_sample.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::selection {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/diagnosis/touches/noise_search.h"
+#include "server/diagnosis/touches/noise/noise_search.h"
 
 namespace touchstone::diagnosis::touches {
 

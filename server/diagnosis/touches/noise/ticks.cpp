@@ -1,4 +1,4 @@
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 
 #include <algorithm>
 #include <cmath>

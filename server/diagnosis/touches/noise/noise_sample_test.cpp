@@ -1,4 +1,4 @@
-#include "server/diagnosis/touches/noise_sample.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
 
 #include <gtest/gtest.h>
 

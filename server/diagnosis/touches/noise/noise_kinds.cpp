@@ -1,11 +1,11 @@
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "server/diagnosis/touches/noise_search.h"
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/noise_search.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/diagnosis/touches/noise_likelihood.h"
+#include "server/diagnosis/touches/noise/noise_likelihood.h"
 
 namespace touchstone::diagnosis::touches {
 

@@ -1,4 +1,4 @@
-#include "server/diagnosis/touches/noise_search.h"
+#include "server/diagnosis/touches/noise/noise_search.h"
 
 #include <algorithm>
 #include <cmath>

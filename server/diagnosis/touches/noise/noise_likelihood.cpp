@@ -1,4 +1,4 @@
-#include "server/diagnosis/touches/noise_likelihood.h"
+#include "server/diagnosis/touches/noise/noise_likelihood.h"
 
 #include <algorithm>
 #include <array>

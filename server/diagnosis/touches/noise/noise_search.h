@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 
 namespace touchstone::diagnosis::touches {
 
