@@ -8,7 +8,7 @@
 #include "server/session/images/image_set_file.h"
 #include "server/session/images/image_set_hdf5.h"
 #include "server/session/session_files.h"
-#include "tests/faults/failing_test.h"
+#include "tests/faults/preloaded/failing_test.h"
 
 namespace touchstone::faults {
 namespace {

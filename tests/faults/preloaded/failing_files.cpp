@@ -1,7 +1,7 @@
 // A disk that fails, or a kill, at the n-th call of a program on the files below one folder: preloaded into it (LD_PRELOAD).
 // Counted are the calls that open, make, write, cut, sync, close, link, rename and remove; those of libraries (HDF5, SQLite)
 // too. TOUCHSTONE_FAILING_FILES names a file of a `FailurePlan`, which the test keeps mapped; a test may also be linked with it.
-#include "tests/faults/failing_files.h"
+#include "tests/faults/preloaded/failing_files.h"
 
 #include <dlfcn.h>
 #include <fcntl.h>

@@ -12,7 +12,7 @@
 #include "server/gateway/rig/idle_effector.h"
 #include "server/gateway/rig/rig.h"
 #include "server/gateway/rig/watches/scripted_arm.h"
-#include "tests/faults/failing_test.h"
+#include "tests/faults/preloaded/failing_test.h"
 
 namespace touchstone::faults {
 namespace {

@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/test_tier.h"
-#include "tests/faults/failing_test.h"
+#include "tests/faults/preloaded/failing_test.h"
 
 namespace touchstone::faults {
 namespace {

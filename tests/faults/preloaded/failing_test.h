@@ -20,7 +20,7 @@
 #include "server/base/test_folder.h"
 #include "server/base/text/text.h"
 #include "server/session/journal/journal.h"
-#include "tests/faults/failing_files.h"
+#include "tests/faults/preloaded/failing_files.h"
 
 namespace touchstone::faults {
 
