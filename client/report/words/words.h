@@ -19,7 +19,7 @@ std::string Tick(double value);
 // Whole numbers of at least five digits in groups: "1 000 000".
 std::string Count(uint64_t count);
 
-// Three figures, so that columns of times line up (TimeInWords of base/readable_time.h drops trailing zeros).
+// Three figures, so that columns of times line up (TimeInWords of base/text/readable_time.h drops trailing zeros).
 std::string Time(double us);                                              // "41.0 ms", "850 us"
 std::string SignedTime(double us);                                        // "+9.10 ms"
 std::string TimeChange(double from_us, double to_us);                     // "41.0 -> 5.0 ms"

@@ -1,5 +1,5 @@
 // The one place where programs make files: whole or absent, whatever call of the system fails. SQLite (journals) has a seam
-// of its own; HDF5 writes through this one (session/hdf5_driver.h). tests/faults/preloaded/failing_files.cpp fails every call in turn.
+// of its own; HDF5 writes through this one (session/hdf5/hdf5_driver.h). tests/faults/preloaded/failing_files.cpp fails every call in turn.
 #pragma once
 
 #include <sys/types.h>

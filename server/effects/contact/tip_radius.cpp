@@ -1,7 +1,7 @@
 // Tip radius: the fingers end in spheres, not points. A sphere meets a sloping surface with its flank, before the
 // point in front would, and rolls over edges and corners.
 //   contact when the swept sphere first touches the surface; on a plane its foremost point has then gone
-//   radius (1 / cos(inc) - 1) less than a point would. The stage casts the sphere (geometry/surface.h).
+//   radius (1 / cos(inc) - 1) less than a point would. The stage casts the sphere (geometry/surface/surface.h).
 #include "server/effects/define_effect.h"
 
 namespace touchstone::effects {

@@ -91,7 +91,7 @@ struct JournalSeries {
   std::string columns;
 };
 
-// Where a session's time began, on the clock of one boot of a host; rig/session_clock.h.
+// Where a session's time began, on the clock of one boot of a host; rig/watches/session_clock.h.
 struct JournalClock {
   std::string boot_id;  // empty: none was written
   double origin_s = 0;

@@ -38,7 +38,7 @@ void AssessByPixels(const Photographs& photographs, const engine::NoiseFloor& fl
 
 // The error on photographs that a fit did not see over the error on the same photographs where it saw them, over all
 // their pixels; at least 1. The fit is made anew without each object, without each fifth of the poses and without each
-// fifth of the session (engine/held_out.h): of the three the largest. `experiment`: of these rows. Errors as
+// fifth of the session (engine/fit/held_out.h): of the three the largest. `experiment`: of these rows. Errors as
 // engine::RefitWithoutParts.
 absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoRows& rows,
                                     const engine::Experiment& experiment, const engine::Fit& fit);

@@ -20,7 +20,7 @@ Eigen::Vector3d ForceAtRest(const arm::Arm& arm, const Eigen::Vector3d& zeroed_n
 
 // OK, or FAILED_PRECONDITION: at rest the arm feels more than 45 % of the limit. A payload that is set wrong or something
 // that presses against the tool, either way no motion should begin. (The error of an arm's sensor is at most half the
-// limit: arm/motion_limits.cpp.)
+// limit: arm/kinematics/motion_limits.cpp.)
 absl::Status CheckForceAtRest(const Eigen::Vector3d& at_rest_n, double max_force_n);
 
 // What is felt at rest before the motion is subtracted: a payload that is set a little wrong, a sensor's offset. No more
