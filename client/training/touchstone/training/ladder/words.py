@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .ladder import HiddenRig, Rung
-from .result import Estimate, Table
-from .statistics import estimate, estimate_share
+from ..result import Estimate, Table
+from ..statistics import estimate, estimate_share
+from . import HiddenRig, Rung
 
 MARGIN = 0.03  # of accuracy: a loss whose interval lies below it is called none
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from . import figures, plans
-from .context import Context
-from .ladder_words import Climb, verdict
-from .result import Estimate, Figure
+from .. import figures, plans
+from ..context import Context
+from ..result import Estimate, Figure
+from .words import Climb, verdict
 
 
 def draw_ladder(context: Context, climbs: Sequence[Climb], alone: Mapping[str, tuple[float, Estimate]]) -> Figure:

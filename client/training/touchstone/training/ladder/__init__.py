@@ -18,11 +18,11 @@ import numpy as np
 import touchstone
 from touchstone.whole_file import whole_file
 
-from .context import Context
-from .features import Features, FeatureSets, curvatures, dealt_sets
-from .separation import check
-from .settings import SUPERSHAPES
-from .touch_data import TouchData
+from ..context import Context
+from ..features import Features, FeatureSets, curvatures, dealt_sets
+from ..separation import check
+from ..settings import SUPERSHAPES
+from ..touch_data import TouchData
 
 # An emulated optical sensor's noise, so that what the model lacks is seen beside it (the seed's 48 ms would hide it).
 SIGMA_US = 5000.0
