@@ -1,7 +1,7 @@
 // touchstone-gateway: the physical source as a process. Options come from flags and a TOML file; flags win.
 #include <malloc.h>
 
-#include "server/base/out_of_memory.h"
+#include "server/base/process/out_of_memory.h"
 #include "server/service/gateway/gateway_server.h"
 #include "server/service/rpc/process.h"
 

@@ -1,5 +1,5 @@
 // touchstone-server: the virtual source as a process. Options come from flags and a TOML file; flags win.
-#include "server/base/out_of_memory.h"
+#include "server/base/process/out_of_memory.h"
 #include "server/service/rpc/process.h"
 #include "server/service/rpc/server.h"
 #include "server/service/rpc/server_flags.h"

@@ -17,11 +17,11 @@
 #include "client/cli/common/common.h"
 #include "client/cli/common/terminal.h"
 #include "client/workbench/page.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/version.h"
 #include "server/diagnosis/boards/board_pictures.h"
-#include "server/geometry/surface.h"
-#include "server/image/renderer.h"
+#include "server/geometry/surface/surface.h"
+#include "server/image/renderers/renderer.h"
 #include "server/service/channel/channel.h"
 
 namespace touchstone::cli {

@@ -3,9 +3,9 @@
 #include "client/cli/common/terminal.h"
 #include "client/workbench_server/formula_words.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/effects/formula.h"
-#include "server/effects/pixel_variables.h"
+#include "server/base/text/text.h"
+#include "server/effects/formula/formula.h"
+#include "server/effects/formula/pixel_variables.h"
 
 namespace touchstone::cli {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/completion.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/version.h"
+#include "server/base/text/text.h"
 #include "server/service/options/man_page.h"
 
 namespace touchstone::cli {

@@ -6,7 +6,7 @@
 #include "client/cli/common/common.h"
 #include "client/cli/common/exit_code.h"
 #include "client/cli/common/interrupt.h"
-#include "server/base/out_of_memory.h"
+#include "server/base/process/out_of_memory.h"
 
 namespace touchstone::cli {
 

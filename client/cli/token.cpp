@@ -10,9 +10,9 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/common/output_file.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/core/access_file.h"
 
 namespace touchstone::cli {

@@ -10,8 +10,8 @@
 #include <CLI/CLI.hpp>
 
 #include "grpc/health/v1/health.grpc.pb.h"
-#include "server/base/out_of_memory.h"
-#include "server/base/text.h"
+#include "server/base/process/out_of_memory.h"
+#include "server/base/text/text.h"
 #include "server/service/channel/channel.h"
 #include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "client/report/joint.h"
-#include "client/report/next_commands.h"
 #include "client/report/report.h"
 #include "client/report/report_json.h"
-#include "client/report/words.h"
+#include "client/report/words/joint.h"
+#include "client/report/words/next_commands.h"
+#include "client/report/words/words.h"
 #include "client/workbench/page.h"
 #include "server/base/status.h"
 

@@ -5,7 +5,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 
 namespace touchstone::client {

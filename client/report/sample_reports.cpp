@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/report/sample_evidence.h"
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 
 namespace touchstone::client {
 namespace {

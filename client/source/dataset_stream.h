@@ -11,10 +11,10 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/support/sync_stream.h>
 
-#include "client/source/batch.h"
-#include "client/source/connection.h"
-#include "client/source/lease_keeper.h"
-#include "server/base/clock.h"
+#include "client/source/connection/connection.h"
+#include "client/source/connection/lease_keeper.h"
+#include "client/source/dataset/batch.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::client {
 

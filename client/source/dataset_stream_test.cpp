@@ -10,9 +10,9 @@
 #include <future>
 #include <thread>
 
-#include "client/source/errors.h"
-#include "server/base/manual_clock.h"
+#include "client/source/connection/errors.h"
 #include "server/base/test_tier.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/service/rpc/server.h"
 
 namespace touchstone::client {

@@ -11,11 +11,11 @@
 #include <chrono>
 #include <filesystem>
 
-#include "client/source/dataset_folder.h"
-#include "client/source/synced_file.h"
-#include "server/base/file_writer.h"
+#include "client/source/dataset/dataset_folder.h"
+#include "client/source/dataset/synced_file.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::client {
 namespace {

@@ -12,10 +12,10 @@
 
 #include <absl/status/statusor.h>
 
-#include "client/source/connection.h"
-#include "client/source/dataset_manifest.h"
+#include "client/source/connection/connection.h"
+#include "client/source/dataset/dataset_manifest.h"
+#include "client/source/dataset/shard_writer.h"
 #include "client/source/dataset_stream.h"
-#include "client/source/shard_writer.h"
 
 namespace touchstone::client {
 

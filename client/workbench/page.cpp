@@ -4,8 +4,8 @@
 #include <absl/strings/str_replace.h>
 
 #include "client/workbench/page_bytes.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::workbench {
 

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "client/source/connection.h"
-#include "client/source/measurement_csv.h"
-#include "client/source/session_parts.h"
+#include "client/source/connection/connection.h"
+#include "client/source/dataset/measurement_csv.h"
+#include "client/source/plans/session_parts.h"
 #include "server/base/status.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"

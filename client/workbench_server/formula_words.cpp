@@ -2,9 +2,9 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/effects/formula.h"
-#include "server/effects/formula_program.h"
-#include "server/effects/pixel_variables.h"
+#include "server/effects/formula/formula.h"
+#include "server/effects/formula/formula_program.h"
+#include "server/effects/formula/pixel_variables.h"
 
 namespace touchstone::workbench {
 namespace {

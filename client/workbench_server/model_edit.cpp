@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "client/source/lab_units.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"

@@ -9,11 +9,11 @@
 
 #include "client/report/report.h"
 #include "client/workbench/page.h"
-#include "client/workbench_server/bridge.h"
 #include "client/workbench_server/example.h"
 #include "client/workbench_server/formula_words.h"
+#include "client/workbench_server/http/bridge.h"
+#include "client/workbench_server/http/request_guard.h"
 #include "client/workbench_server/model_edit.h"
-#include "client/workbench_server/request_guard.h"
 #include "server/base/status.h"
 
 namespace touchstone::workbench {

@@ -20,9 +20,9 @@
 #include <string>
 
 #include <absl/status/statusor.h>
-#include "client/workbench_server/http_server.h"
-#include "client/workbench_server/rig_desk.h"
-#include "client/workbench_server/upstream.h"
+#include "client/workbench_server/http/http_server.h"
+#include "client/workbench_server/http/upstream.h"
+#include "client/workbench_server/rig/rig_desk.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::workbench {

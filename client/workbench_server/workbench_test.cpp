@@ -10,12 +10,12 @@
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 #include "client/workbench/page.h"
 #include "client/workbench_server/example.h"
-#include "client/workbench_server/grpc_web.h"
+#include "client/workbench_server/http/grpc_web.h"
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/rpc/server.h"
 
 namespace touchstone::workbench {

@@ -58,8 +58,8 @@ def number(value):
 
 def physics_of(name: str) -> str:
     """The comment at the head of the effect's source: what happens, and its formula."""
-    source = repository.ROOT / "server/effects" / f"{name}.cpp"
-    if not source.exists():
+    sources = list((repository.ROOT / "server/effects").glob(f"*/{name}.cpp"))
+    if not sources:
         return ""
-    head = re.match(r"(?://.*\n)+", source.read_text(encoding="utf-8"))
+    head = re.match(r"(?://.*\n)+", sources[0].read_text(encoding="utf-8"))
     return "\n".join(line[2:].removeprefix(" ") for line in head.group().splitlines()) if head else ""

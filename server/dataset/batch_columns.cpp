@@ -4,8 +4,8 @@
 #include <cstring>
 
 #include "server/base/status.h"
-#include "server/image/encode.h"
-#include "server/image/normalize.h"
+#include "server/image/encoding/encode.h"
+#include "server/image/normalize/normalize.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::dataset {

@@ -1,7 +1,7 @@
 #include "server/base/status.h"
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/dataset/stream.h"
-#include "server/image/photo_image.h"
+#include "server/image/photograph/photo_image.h"
 
 namespace touchstone::dataset {
 

@@ -7,7 +7,7 @@
 
 #include "server/base/test_paths.h"
 #include "server/dataset/test_support.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 
 namespace touchstone::dataset {
 namespace {

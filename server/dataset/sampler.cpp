@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "server/base/status.h"
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/plan_drawer.h"
 

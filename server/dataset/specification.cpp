@@ -3,10 +3,10 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/image/normalize.h"
-#include "server/image/photo_image.h"
+#include "server/image/normalize/normalize.h"
+#include "server/image/photograph/photo_image.h"
 
 namespace touchstone::dataset {
 namespace {

@@ -9,8 +9,8 @@
 
 #include <absl/status/status.h>
 
-#include "server/geometry/surface.h"
-#include "server/image/renderer.h"
+#include "server/geometry/surface/surface.h"
+#include "server/image/renderers/renderer.h"
 #include "server/model/model.h"
 #include "server/touch/plan.h"
 #include "server/uncertainty/posterior.h"
@@ -24,7 +24,8 @@ struct DatasetImage {
   image::ImageOptions options;
   ImageEncoding encoding = ImageEncoding::kRaw;
   int jpeg_quality = 90;
-  bool normalize = false;  // image/normalize.h: a grey picture; options.mask is then the mask that it finds
+  // image/normalize/normalize.h: a grey picture; options.mask is then the mask that it finds.
+  bool normalize = false;
   double vertical_fov_rad = 0.78539816339744831;
   image::RendererKind renderer_kind = image::RendererKind::kAuto;  // asked for
   std::shared_ptr<image::Renderer> renderer;  // that renders; null where a camera takes the images

@@ -7,7 +7,7 @@
 #include <new>
 
 #include "server/base/status.h"
-#include "server/base/thread_time.h"
+#include "server/base/threads/thread_time.h"
 
 namespace touchstone::dataset {
 namespace {

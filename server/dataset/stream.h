@@ -13,7 +13,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/dataset/batch_columns.h"
 #include "server/dataset/sampler.h"
 #include "server/dataset/specification.h"

@@ -8,7 +8,7 @@
 
 #include "server/dataset/test_support.h"
 #include "server/effects/all_effects.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 

@@ -4,7 +4,7 @@
 
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 namespace touchstone::diagnosis {
 namespace {

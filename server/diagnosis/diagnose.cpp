@@ -1,13 +1,13 @@
 #include "server/diagnosis/diagnose.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/explain_reports.h"
+#include "server/diagnosis/answers/explain_reports.h"
+#include "server/diagnosis/answers/plan_reports.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
 #include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/photograph_reports.h"
-#include "server/diagnosis/plan_reports.h"
 #include "server/diagnosis/session_reports.h"
 #include "server/diagnosis/touch_reports.h"
-#include "server/diagnosis/uncertainty_reports.h"
 
 namespace touchstone::diagnosis {
 

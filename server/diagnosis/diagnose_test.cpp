@@ -9,7 +9,7 @@
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis {

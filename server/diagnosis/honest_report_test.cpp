@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/diagnose.h"

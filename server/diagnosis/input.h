@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "server/base/thread_pool.h"
-#include "server/geometry/surface.h"
+#include "server/base/threads/thread_pool.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
-#include "server/session/image_set.h"
-#include "server/session/measurement_set.h"
+#include "server/session/images/image_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::diagnosis {
 

@@ -3,13 +3,13 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/diagnosis/answers/early_verdicts.h"
 #include "server/diagnosis/checks/data_problems.h"
-#include "server/diagnosis/early_verdicts.h"
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/photograph_reports.h"
-#include "server/diagnosis/report/from_photographs.h"
 #include "server/diagnosis/report/join.h"
+#include "server/diagnosis/report/kinds/from_photographs.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/touch_reports.h"
 

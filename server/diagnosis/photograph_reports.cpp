@@ -7,12 +7,12 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/checks/photo_mistakes.h"
+#include "server/diagnosis/checks/photographs/photo_mistakes.h"
 #include "server/diagnosis/design/propose_photographs.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
-#include "server/diagnosis/report/from_photographs.h"
-#include "server/diagnosis/report/summary.h"
-#include "server/diagnosis/residuals/describe_photographs.h"
+#include "server/diagnosis/report/kinds/from_photographs.h"
+#include "server/diagnosis/report/words/summary.h"
+#include "server/diagnosis/residuals/photographs/describe_photographs.h"
 
 namespace touchstone::diagnosis {
 namespace {

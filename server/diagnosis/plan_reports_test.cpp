@@ -1,5 +1,5 @@
 // A check of a plan against what diagnoses of such sets find.
-#include "server/diagnosis/plan_reports.h"
+#include "server/diagnosis/answers/plan_reports.h"
 
 #include <gtest/gtest.h>
 

@@ -8,17 +8,17 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/diagnosis/early_verdicts.h"
-#include "server/diagnosis/engine/ladder.h"
-#include "server/diagnosis/report/from_sessions.h"
-#include "server/diagnosis/report/from_touches.h"
+#include "server/diagnosis/answers/early_verdicts.h"
+#include "server/diagnosis/answers/session_poses.h"
+#include "server/diagnosis/answers/session_posterior.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/report/join.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/kinds/from_sessions.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
+#include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/selection/touch_modality.h"
-#include "server/diagnosis/session_poses.h"
-#include "server/diagnosis/session_posterior.h"
 #include "server/diagnosis/touch_reports.h"
-#include "server/diagnosis/uncertainty_reports.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis {

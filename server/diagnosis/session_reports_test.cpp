@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis {

@@ -7,7 +7,7 @@
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 
 namespace touchstone::diagnosis {
 namespace {

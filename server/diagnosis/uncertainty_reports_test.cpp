@@ -1,6 +1,6 @@
 // How sure a fitted model's predictions are: what a report says of that, against touches of the same rig that
 // no fit has seen.
-#include "server/diagnosis/uncertainty_reports.h"
+#include "server/diagnosis/answers/uncertainty_reports.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/touches/simulated_test_set.h"

@@ -1,8 +1,8 @@
 #include "server/effects/all_effects.h"
 
-#include "server/effects/formula.h"
-#include "server/effects/lookup.h"
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
+#include "server/effects/formula/formula.h"
+#include "server/effects/formula/lookup.h"
 
 // The built-in effects by stage, touches before photographs, in the order in which a stage applies and the catalogue lists them:
 // one line each, the name of the function that its file exports. Registration by static objects is not used:

@@ -4,9 +4,9 @@
 #include <cstring>
 
 #include "server/base/check.h"
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::effects {
 namespace {

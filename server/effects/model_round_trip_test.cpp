@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 

@@ -1,5 +1,5 @@
 // What effects change of one photograph: the camera, the light and the image sensor, as numbers that the simulation of
-// photographs reads (image/simulate_photo.h). The stages camera pose, projection, shading and image sensor run in the
+// photographs reads (image/photograph/simulate_photo.h). The stages camera pose, projection, shading and image sensor run in the
 // order of the fields; every field starts at the value that changes nothing.
 //
 // Camera frame as OpenCV's: x right, y down, z forward. Linear light: what the nominal shading gives, 0 to 1, white at

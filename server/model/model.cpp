@@ -4,11 +4,11 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/text.h"
-#include "server/model/lookup_fields.h"
+#include "server/base/text/text.h"
+#include "server/model/fields/lookup_fields.h"
+#include "server/model/fields/user_term_fields.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
-#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 namespace {

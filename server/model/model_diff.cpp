@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <set>
 
-#include "server/model/lookup_fields.h"
+#include "server/model/fields/lookup_fields.h"
+#include "server/model/fields/user_term_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
-#include "server/model/user_term_fields.h"
 
 namespace touchstone::model {
 namespace {

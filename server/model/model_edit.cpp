@@ -8,9 +8,9 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/model/formula_fields.h"
-#include "server/model/lookup_fields.h"
+#include "server/base/text/text.h"
+#include "server/model/fields/formula_fields.h"
+#include "server/model/fields/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/own_name.h"
 #include "server/model/parameter_values.h"

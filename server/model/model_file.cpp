@@ -8,14 +8,14 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/model/formula_fields.h"
-#include "server/model/lookup_fields.h"
+#include "server/base/text/text.h"
+#include "server/model/fields/formula_fields.h"
+#include "server/model/fields/lookup_fields.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/provenance.h"
 #include "server/model/surface_map_file.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::model {
 namespace {

@@ -7,13 +7,13 @@
 
 #include <algorithm>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
+#include "server/model/fields/user_term_fields.h"
 #include "server/model/finger_name.h"
 #include "server/model/model.h"
 #include "server/model/parameter_values.h"
 #include "server/model/surface_map_file.h"
-#include "server/model/user_term_fields.h"
-#include "server/model/yaml_text.h"
+#include "server/model/yaml/yaml_text.h"
 
 namespace touchstone::model {
 namespace {

@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/parameter_values.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::model {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::model {
 namespace {

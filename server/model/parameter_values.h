@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/types/span.h>
 
-#include "server/base/file_number.h"
+#include "server/base/text/file_number.h"
 #include "server/model/model.h"
 
 namespace touchstone::model {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/model/yaml_text.h"
+#include "server/base/text/text.h"
+#include "server/model/yaml/yaml_text.h"
 
 namespace touchstone::model {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::model {
 

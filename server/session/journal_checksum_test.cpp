@@ -7,12 +7,12 @@
 #include <fstream>
 #include <random>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
-#include "server/base/text.h"
-#include "server/session/command_bytes.h"
-#include "server/session/journal.h"
+#include "server/base/text/text.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/journal/journal.h"
 #include "server/session/session_files.h"
 
 namespace touchstone::session {

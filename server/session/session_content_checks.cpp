@@ -5,14 +5,14 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
-#include "server/image/encode.h"
-#include "server/session/measurement_checks.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/measurements/measurement_checks.h"
+#include "server/session/recorded/touch_series.h"
 #include "server/session/session_measurements.h"
-#include "server/session/touch_series.h"
 
 namespace touchstone::session {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <absl/status/status.h>
 
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::session {
 

@@ -7,12 +7,12 @@
 #include <limits>
 #include <set>
 
-#include "server/base/file_writer.h"
-#include "server/base/nan.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/session/command_bytes.h"
-#include "server/session/emulated.h"
+#include "server/base/text/text.h"
+#include "server/session/images/emulated.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/session/session_content_checks.h"
 #include "server/session/session_measurements.h"
 

@@ -8,7 +8,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::session {
 

@@ -1,5 +1,5 @@
 #include "server/session/session_files.h"
-#include "server/session/touch_series.h"
+#include "server/session/recorded/touch_series.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,12 +11,12 @@
 #include <limits>
 #include <random>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
-#include "server/image/encode.h"
-#include "server/session/command_bytes.h"
-#include "server/session/emulated.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/images/emulated.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/session/session_measurements.h"
 
 namespace touchstone::session {

@@ -6,14 +6,14 @@
 #include <optional>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/session/command_bytes.h"
-#include "server/session/emulated.h"
-#include "server/session/hdf5_file.h"
+#include "server/base/text/text.h"
+#include "server/session/hdf5/hdf5_file.h"
+#include "server/session/images/emulated.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/recorded/touch_series.h"
 #include "server/session/session_content_checks.h"
 #include "server/session/session_files.h"
 #include "server/session/session_hdf5_images.h"
-#include "server/session/touch_series.h"
 
 namespace touchstone::session {
 namespace {

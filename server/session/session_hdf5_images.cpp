@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
 
 namespace touchstone::session {

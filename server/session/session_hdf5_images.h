@@ -5,8 +5,8 @@
 
 #include <absl/status/status.h>
 
-#include "server/session/hdf5_file.h"
-#include "server/session/journal.h"
+#include "server/session/hdf5/hdf5_file.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::session {
 

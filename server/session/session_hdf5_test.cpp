@@ -9,15 +9,15 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/base/file_writer.h"
-#include "server/base/nan.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
-#include "server/base/text.h"
-#include "server/image/encode.h"
-#include "server/session/hdf5_handle.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/hdf5/hdf5_handle.h"
+#include "server/session/recorded/touch_series.h"
 #include "server/session/session_files.h"
-#include "server/session/touch_series.h"
 
 namespace touchstone::session {
 namespace {

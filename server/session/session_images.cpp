@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/emulated.h"
-#include "server/session/image_set_file.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/emulated.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::session {
 namespace {

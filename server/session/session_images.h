@@ -6,8 +6,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/image_set.h"
-#include "server/session/journal.h"
+#include "server/session/images/image_set.h"
+#include "server/session/journal/journal.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::session {

@@ -8,9 +8,9 @@
 #include "server/base/test_folder.h"
 #include "server/base/units.h"
 #include "server/geometry/pose.h"
-#include "server/image/encode.h"
-#include "server/session/emulated.h"
-#include "server/session/image_set_file.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/images/emulated.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::session {
 namespace {

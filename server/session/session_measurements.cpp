@@ -7,10 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/session/command_bytes.h"
-#include "server/session/emulated.h"
+#include "server/session/images/emulated.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/measurements/measurement_checks.h"
 
 namespace touchstone::session {
 namespace {

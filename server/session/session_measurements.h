@@ -6,9 +6,9 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/journal.h"
-#include "server/session/measurement_csv.h"
-#include "server/session/measurement_set.h"
+#include "server/session/journal/journal.h"
+#include "server/session/measurements/measurement_csv.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::session {
 
@@ -31,10 +31,5 @@ absl::StatusOr<MeasurementSet> MakeMeasurementSet(const std::vector<MeasuredTouc
 // Both.
 absl::StatusOr<MeasurementSet> SessionMeasurementSet(const Journal& journal, const std::string& session,
                                                      const std::string& origin);
-
-// Whether a set that was put together elsewhere, a message for instance, is one that a file could have been read as:
-// columns of equal length, values in range, every touch number once. Makes the vectors exact. Errors name the
-// origin, the line that the row would have in a file, and the value.
-absl::Status CheckMeasurementSet(MeasurementSet* set, const MeasurementLimits& limits = {});
 
 }  // namespace touchstone::session

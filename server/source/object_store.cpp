@@ -5,9 +5,9 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/base/text/text.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::source {
 namespace {

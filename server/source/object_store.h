@@ -8,8 +8,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
-#include "server/geometry/surface.h"
+#include "server/base/threads/thread_pool.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::source {
 

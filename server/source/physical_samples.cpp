@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/physical_source.h"
 #include "server/touch/batch_row.h"
 

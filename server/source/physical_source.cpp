@@ -7,7 +7,7 @@
 #include <map>
 
 #include "server/base/status.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/physical_samples.h"
 
 namespace touchstone::source {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/test_source.h"
 
 namespace touchstone::source {

@@ -4,8 +4,8 @@
 
 #include "server/base/status.h"
 #include "server/geometry/pose.h"
-#include "server/image/encode.h"
-#include "server/session/command_bytes.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/journal/command_bytes.h"
 
 namespace touchstone::source {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/recorded_touches.h"
+#include "server/session/recorded/recorded_touches.h"
 #include "server/source/rig_device.h"
 
 namespace touchstone::source {

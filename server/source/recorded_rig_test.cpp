@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "server/base/test_folder.h"
-#include "server/image/encode.h"
-#include "server/session/command_bytes.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/test_source.h"
 
 namespace touchstone::source {

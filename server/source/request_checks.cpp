@@ -2,9 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::source {
 namespace {

@@ -9,10 +9,10 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 #include "server/image/image.h"
-#include "server/image/photograph.h"
-#include "server/session/journal.h"
+#include "server/image/photograph/photograph.h"
+#include "server/session/journal/journal.h"
 #include "server/source/motion_guard.h"
 #include "server/source/source_state.h"
 #include "server/touch/commanded_touch.h"

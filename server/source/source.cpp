@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/touch/plan_drawer.h"
 #include "server/touch/touch_notes.h"
 

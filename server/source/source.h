@@ -18,7 +18,7 @@
 #include "server/dataset/specification.h"
 #include "server/dataset/stream.h"
 #include "server/model/model.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 #include "server/source/motion_guard.h"
 #include "server/source/object_store.h"
 #include "server/source/request_checks.h"

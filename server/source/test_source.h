@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/image/normalize.h"
+#include "server/image/normalize/normalize.h"
 #include "server/source/source.h"
 
 namespace touchstone::source {

@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/image/photo_image.h"
+#include "server/image/photograph/photo_image.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <mutex>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/source/source.h"
 
 namespace touchstone::source {

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 
 namespace touchstone::touch {

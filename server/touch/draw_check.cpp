@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::touch {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/plan.h"
 #include "server/touch/simulate.h"

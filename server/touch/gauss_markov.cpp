@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::touch {
 namespace {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::touch {

@@ -9,8 +9,8 @@
 #include <absl/types/span.h>
 
 #include "server/base/touch_limits.h"
-#include "server/geometry/mesh.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/mesh/mesh.h"
+#include "server/geometry/surface/surface.h"
 #include "server/touch/commanded_touch.h"
 
 namespace touchstone::touch {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/touch/batch_row.h"
 

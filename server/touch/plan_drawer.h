@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
 #include "server/touch/draw_check.h"
 #include "server/touch/plan.h"

@@ -7,7 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::touch {

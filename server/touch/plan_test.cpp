@@ -8,7 +8,7 @@
 #include <set>
 
 #include "server/base/units.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::touch {
 namespace {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/touch/gauss_markov.h"
 #include "server/touch/simulate.h"

@@ -10,7 +10,7 @@
 #include <absl/status/status.h>
 
 #include "server/effects/touch_batch.h"
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
 
 namespace touchstone::touch {

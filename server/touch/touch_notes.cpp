@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/geometry/plausible_size.h"
+#include "server/geometry/files/plausible_size.h"
 
 namespace touchstone::touch {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::touch {
 namespace {

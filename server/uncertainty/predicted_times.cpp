@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/matern.h"
-#include "server/base/nan.h"
+#include "server/base/numbers/matern.h"
+#include "server/base/numbers/nan.h"
 #include "server/base/status.h"
-#include "server/effects/surface_departure.h"
-#include "server/geometry/surface.h"
+#include "server/effects/contact/surface_departure.h"
+#include "server/geometry/surface/surface.h"
 #include "server/model/value_names.h"
 
 namespace touchstone::uncertainty {

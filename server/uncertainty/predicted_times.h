@@ -16,7 +16,7 @@
 
 #include <absl/status/status.h>
 
-#include "server/effects/surface_map.h"
+#include "server/effects/contact/surface_map.h"
 #include "server/touch/simulate.h"
 #include "server/uncertainty/posterior.h"
 

@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-#include "server/base/matern.h"
+#include "server/base/numbers/matern.h"
 #include "server/effects/all_effects.h"
 #include "server/uncertainty/budget.h"
 

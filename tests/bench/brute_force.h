@@ -2,7 +2,7 @@
 // Detection, 5.3.6), single precision, no acceleration.
 #pragma once
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 
 namespace touchstone::bench {
 

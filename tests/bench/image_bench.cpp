@@ -1,7 +1,7 @@
 // Images and encodings on one core: lat20 with about 20,000 triangles, 224 x 224 unless the name says else.
 #include <benchmark/benchmark.h>
 
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 #include "tests/bench/scene.h"
 
 namespace touchstone::bench {

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "tests/bench/scene.h"
 
 int main() {

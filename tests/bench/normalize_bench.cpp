@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "server/base/test_paths.h"
-#include "server/geometry/mesh_file.h"
-#include "server/image/emulated_photograph.h"
-#include "server/image/normalize.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/image/normalize/emulated_photograph.h"
+#include "server/image/normalize/normalize.h"
 
 namespace touchstone::image {
 namespace {

@@ -4,7 +4,7 @@
 //                    depend on it is kept
 #include <benchmark/benchmark.h>
 
-#include "server/image/simulate_photo.h"
+#include "server/image/photograph/simulate_photo.h"
 #include "tests/bench/scene.h"
 
 namespace touchstone::bench {

@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "server/image/emulated_photograph.h"
-#include "server/image/renderer.h"
+#include "server/image/normalize/emulated_photograph.h"
+#include "server/image/renderers/renderer.h"
 #include "tests/bench/scene.h"
 
 namespace touchstone::bench {

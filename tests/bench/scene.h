@@ -9,7 +9,7 @@
 
 #include "server/dataset/stream.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::bench {
 

@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 #include "client/source/dataset_stream.h"
 #include "tests/bench/scene.h"
 

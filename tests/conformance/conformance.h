@@ -12,7 +12,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
-#include "server/base/manual_clock.h"
+#include "server/base/threads/manual_clock.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/models.grpc.pb.h"
 #include "touchstone/v1/source.grpc.pb.h"

@@ -5,21 +5,21 @@
 #include <filesystem>
 #include <fstream>
 
-#include "client/source/dataset_manifest.h"
+#include "client/source/dataset/dataset_manifest.h"
 #include "server/base/test_folder.h"
 #include "server/effects/all_effects.h"
-#include "server/effects/formula_program.h"
-#include "server/gateway/arm/primary_message.h"
-#include "server/gateway/arm/rtde_message.h"
+#include "server/effects/formula/formula_program.h"
+#include "server/gateway/arm/protocol/primary_message.h"
+#include "server/gateway/arm/protocol/rtde_message.h"
 #include "server/gateway/calibration/calibration.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/model/model.h"
 #include "server/model/surface_map_file.h"
 #include "server/service/options/option_table.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/images_csv.h"
-#include "server/session/journal.h"
-#include "server/session/measurement_csv.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/images_csv.h"
+#include "server/session/journal/journal.h"
+#include "server/session/measurements/measurement_csv.h"
 #include "tests/fuzz/frame_fuzz.h"
 
 namespace touchstone::fuzz {

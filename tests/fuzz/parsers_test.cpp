@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <random>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::fuzz {
 namespace {

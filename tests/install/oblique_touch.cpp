@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 

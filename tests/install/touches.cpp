@@ -1,11 +1,11 @@
 // touches PLAN.csv MODEL.yaml MESH SEED: the measurement file that `touchstone touch` prints for the same.
 #include <iostream>
 
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/service/core/convert.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"

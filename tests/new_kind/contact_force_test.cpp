@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/findings.h"
 #include "server/diagnosis/engine/row_modality.h"

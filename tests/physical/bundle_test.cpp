@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/bundle/make_bundle.h"
 #include "server/gateway/bundle/replay.h"
 #include "tests/physical/safety_fixture.h"

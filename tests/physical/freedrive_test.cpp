@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "server/geometry/pose.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "tests/physical/safety_fixture.h"
 #include "touchstone/v1/freedrive.grpc.pb.h"
 

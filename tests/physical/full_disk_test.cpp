@@ -1,7 +1,7 @@
 // A disk that is full while the rig touches. The emulated rig's data stand for no measurement.
 #include <gmock/gmock.h>
 
-#include "server/base/full_disk.h"
+#include "server/base/files/full_disk.h"
 #include "tests/physical/physical_test.h"
 
 namespace touchstone {

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "server/base/full_disk.h"
+#include "server/base/files/full_disk.h"
 #include "server/base/units.h"
 #include "server/service/sessions/stored_session.h"
-#include "server/session/emulated.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/emulated.h"
+#include "server/session/images/image_set_file.h"
 #include "tests/physical/physical_test.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 

@@ -15,7 +15,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 
 extern char** environ;
 

@@ -13,10 +13,10 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
-#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/service/gateway/gateway_server.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 #include "tests/rig/emulator.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/rig.grpc.pb.h"

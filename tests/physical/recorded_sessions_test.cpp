@@ -11,11 +11,11 @@
 #include <memory>
 #include <mutex>
 
-#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/service/gateway/gateway_server.h"
-#include "server/session/command_bytes.h"
-#include "server/session/journal.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/journal/journal.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
 namespace touchstone {

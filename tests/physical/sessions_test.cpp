@@ -2,7 +2,7 @@
 // measurement.
 #include <gmock/gmock.h>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "tests/physical/physical_test.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 

@@ -6,7 +6,7 @@
 
 #include "server/base/test_tier.h"
 #include "tests/physical/latch_fixture.h"
-#include "tests/rig/controller/test_client.h"
+#include "tests/rig/controller/protocol/test_client.h"
 
 namespace touchstone {
 namespace {

@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "server/base/test_folder.h"
-#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/arm/motion/motion_planner.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "tests/rig/controller.h"
-#include "tests/rig/controller/test_client.h"
+#include "tests/rig/controller/protocol/test_client.h"
 
 namespace touchstone {
 namespace {

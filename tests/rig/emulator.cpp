@@ -11,8 +11,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/base/text.h"
-#include "server/geometry/surface.h"
+#include "server/base/text/text.h"
+#include "server/geometry/surface/surface.h"
 #include "tests/rig/emulator_commands.h"
 #include "tests/rig/emulator_files.h"
 #include "tests/rig/world/camera.h"

@@ -8,8 +8,8 @@
 #include <absl/strings/str_format.h>
 #include <nlohmann/json.hpp>
 
-#include "server/base/file_writer.h"
-#include "server/base/text.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
 
 namespace touchstone::rig {

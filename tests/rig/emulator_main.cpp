@@ -10,7 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server/base/stop_signals.h"
+#include "server/base/process/stop_signals.h"
 #include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"
 #include "tests/rig/emulator.h"

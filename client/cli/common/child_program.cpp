@@ -20,7 +20,7 @@
 
 #include "client/cli/common/interrupt.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

@@ -17,13 +17,13 @@
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/common/provenance.h"
 #include "client/cli/common/terminal.h"
-#include "client/source/lease_keeper.h"
-#include "server/base/printable.h"
+#include "client/source/connection/lease_keeper.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/version.h"
-#include "server/base/whole_number.h"
-#include "server/geometry/mesh_file.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
+#include "server/base/text/whole_number.h"
+#include "server/geometry/files/mesh_file.h"
 
 namespace touchstone::cli {
 namespace {
@@ -59,7 +59,7 @@ std::string Shown(absl::string_view text) {
   return Printable(text, std::string::npos, /*keep_lines=*/true);
 }
 
-// The same with the styles that reports have on a terminal (client/report/text_layout.cpp).
+// The same with the styles that reports have on a terminal (client/report/words/text_layout.cpp).
 std::string ShownWithStyles(absl::string_view text) {
   std::string shown = Shown(text);
   for (const char* style : {"[0m", "[1m", "[2m", "[32m", "[33m", "[36m"})

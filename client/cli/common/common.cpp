@@ -12,9 +12,9 @@
 
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/common/terminal.h"
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"

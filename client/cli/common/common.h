@@ -15,7 +15,7 @@
 
 #include "client/cli/common/exit_code.h"
 #include "client/cli/common/output_file.h"
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 
 namespace touchstone::cli {
 

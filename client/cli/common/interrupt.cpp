@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "client/cli/common/exit_code.h"
-#include "server/base/stop_signals.h"
+#include "server/base/process/stop_signals.h"
 
 namespace touchstone::cli {
 namespace {

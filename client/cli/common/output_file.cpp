@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "client/cli/common/progress_bar.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

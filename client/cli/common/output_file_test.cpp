@@ -14,7 +14,7 @@
 #include <future>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

@@ -9,8 +9,8 @@
 
 #include <algorithm>
 
-#include "server/base/text.h"
-#include "server/base/version.h"
+#include "server/base/process/version.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <regex>
 
-#include "server/base/text.h"
-#include "server/base/version.h"
+#include "server/base/process/version.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "client/cli/common/common.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/channel/channel.h"
 
 namespace touchstone::cli {

@@ -1,7 +1,7 @@
-// The terminal that a command prints to: its width (server/base/wrapped_text.h), its colours.
+// The terminal that a command prints to: its width (server/base/text/wrapped_text.h), its colours.
 #pragma once
 
-#include "server/base/wrapped_text.h"
+#include "server/base/text/wrapped_text.h"
 
 namespace touchstone::cli {
 

@@ -11,7 +11,7 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/common/progress_bar.h"
-#include "client/source/dataset_check.h"
+#include "client/source/dataset/dataset_check.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

@@ -4,13 +4,13 @@
 #include <absl/strings/ascii.h>
 
 #include "client/cli/options/mesh_options.h"
-#include "client/source/lab_units.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/plausible_size.h"
-#include "server/geometry/supershape.h"
-#include "server/geometry/winding.h"
+#include "server/base/text/text.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/files/plausible_size.h"
+#include "server/geometry/mesh/winding.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/model/model.h"
 #include "server/touch/touch_notes.h"
 

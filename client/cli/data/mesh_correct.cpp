@@ -7,11 +7,11 @@
 
 #include "client/cli/options/mesh_options.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/effects/surface_map.h"
-#include "server/geometry/displace.h"
-#include "server/geometry/mesh_file.h"
+#include "server/effects/contact/surface_map.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/displace.h"
 #include "server/model/surface_map_file.h"
 
 namespace touchstone::cli {

@@ -9,12 +9,12 @@
 #include "client/cli/common/common.h"
 #include "client/cli/common/interrupt.h"
 #include "client/cli/common/progress_bar.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/image/encode.h"
-#include "server/image/normalize.h"
-#include "server/session/image_set_file.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/encode.h"
+#include "server/image/normalize/normalize.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -1,6 +1,6 @@
 // touchstone objects: what can be touched.
 #include "client/cli/common/common.h"
-#include "client/source/lab_units.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

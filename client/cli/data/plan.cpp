@@ -1,8 +1,8 @@
 // touchstone plan: the commanded touches of a plan, without touching anything.
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/options/plan_options.h"
-#include "client/source/lab_units.h"
-#include "client/source/plan_expansion.h"
+#include "client/source/dataset/lab_units.h"
+#include "client/source/plans/plan_expansion.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

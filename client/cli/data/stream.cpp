@@ -13,10 +13,10 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/options/report_posterior.h"
 #include "client/cli/options/slurm.h"
-#include "client/source/dataset_folder.h"
+#include "client/source/dataset/dataset_folder.h"
 #include "client/source/dataset_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

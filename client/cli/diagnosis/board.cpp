@@ -2,14 +2,14 @@
 
 #include "client/cli/options/model_output.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
 #include "server/diagnosis/boards/board_pictures.h"
-#include "server/diagnosis/report/from_boards.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/kinds/from_boards.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
-#include "server/session/camera_yaml.h"
+#include "server/session/images/camera_yaml.h"
 
 namespace touchstone::cli {
 namespace {

@@ -16,12 +16,12 @@
 #include "client/workbench/page.h"
 #include "server/base/check.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/model/model.h"
 #include "server/service/calls/evidence.h"
-#include "server/session/touch_content.h"
+#include "server/session/measurements/touch_content.h"
 
 namespace touchstone::cli {
 namespace {

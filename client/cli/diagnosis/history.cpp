@@ -8,7 +8,7 @@
 #include "client/cli/diagnosis/comparison.h"
 #include "client/report/report.h"
 #include "server/base/status.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::cli {
 namespace {

@@ -5,10 +5,10 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/options/model_output.h"
-#include "client/source/lab_units.h"
-#include "server/base/file_number.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 #include "server/model/model.h"
 

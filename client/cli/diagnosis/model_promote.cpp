@@ -8,7 +8,7 @@
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/options/model_output.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::cli {

@@ -8,10 +8,10 @@
 
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/diagnosis/proposed_touches.h"
-#include "client/report/words.h"
+#include "client/report/words/words.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

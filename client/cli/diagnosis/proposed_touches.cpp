@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 
 namespace touchstone::cli {
 

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/distributions.h"
-#include "server/base/normal.h"
-#include "server/base/random.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/normal.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::cli {

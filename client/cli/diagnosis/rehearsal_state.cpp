@@ -5,7 +5,7 @@
 #include <fstream>
 #include <utility>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

@@ -11,9 +11,9 @@
 #include "client/cli/diagnosis/rehearsal.h"
 #include "client/cli/diagnosis/rehearsal_state.h"
 #include "client/cli/diagnosis/rehearsed_files.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::cli {

@@ -12,12 +12,12 @@
 #include <utility>
 
 #include "client/cli/common/child_program.h"
-#include "client/source/session_parts.h"
-#include "server/base/file_writer.h"
+#include "client/source/plans/session_parts.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/model/parameter_values.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::cli {
 namespace {

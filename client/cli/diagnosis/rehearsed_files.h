@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "client/cli/diagnosis/rehearsal.h"
-#include "client/source/connection.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/connection/connection.h"
+#include "client/source/dataset/measurement_csv.h"
 #include "server/source/object_store.h"
 
 namespace touchstone::cli {

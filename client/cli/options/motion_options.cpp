@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <thread>
 
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

@@ -7,7 +7,7 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/common/interrupt.h"
-#include "client/source/leased_source.h"
+#include "client/source/connection/leased_source.h"
 
 namespace touchstone::cli {
 

@@ -10,11 +10,11 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

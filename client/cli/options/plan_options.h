@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/cli/common/common.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 
 namespace touchstone::cli {
 

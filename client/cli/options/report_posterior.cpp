@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

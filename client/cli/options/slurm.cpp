@@ -13,9 +13,9 @@
 #include <filesystem>
 
 #include "client/cli/common/provenance.h"
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

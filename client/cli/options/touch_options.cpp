@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/touch_limits.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"

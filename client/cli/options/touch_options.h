@@ -6,7 +6,7 @@
 #include <string>
 
 #include "client/cli/common/common.h"
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 
 namespace touchstone::cli {
 

@@ -7,9 +7,9 @@
 #include "client/cli/common/terminal.h"
 #include "client/cli/rig/calibrate.h"
 #include "client/cli/session/journal_session.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 #include "server/gateway/calibration/calibration.h"
@@ -17,7 +17,7 @@
 #include "server/gateway/calibration/tool_calibration.h"
 #include "server/geometry/pose.h"
 #include "server/model/model.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::cli {
 namespace {

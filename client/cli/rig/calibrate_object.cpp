@@ -5,14 +5,14 @@
 
 #include "client/cli/common/progress_bar.h"
 #include "client/cli/rig/calibrate.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/object_registration.h"
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/service/core/convert.h"
 
 namespace touchstone::cli {

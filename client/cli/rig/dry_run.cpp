@@ -5,11 +5,11 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/rig/rig.h"
 #include "client/report/path_drawing.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::cli {
 namespace {

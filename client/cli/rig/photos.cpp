@@ -9,9 +9,9 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/rig/rig.h"
 #include "client/cli/session/image_set.h"
-#include "client/source/batch.h"
+#include "client/source/dataset/batch.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/service/core/convert.h"
 

@@ -8,9 +8,9 @@
 
 #include "client/cli/session/journal_session.h"
 #include "server/base/status.h"
-#include "server/session/base_pose.h"
-#include "server/session/command_bytes.h"
-#include "server/session/touch_series.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/recorded/base_pose.h"
+#include "server/session/recorded/touch_series.h"
 
 namespace touchstone::cli {
 

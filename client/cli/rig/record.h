@@ -9,8 +9,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "client/source/measurement_csv.h"
-#include "server/session/journal.h"
+#include "client/source/dataset/measurement_csv.h"
+#include "server/session/journal/journal.h"
 #include "touchstone/v1/rig.pb.h"
 #include "touchstone/v1/types.pb.h"
 

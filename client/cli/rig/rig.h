@@ -7,8 +7,8 @@
 
 #include "client/cli/common/common.h"
 #include "client/cli/options/motion_options.h"
-#include "client/source/rig_plan.h"
-#include "client/source/rig_words.h"
+#include "client/source/plans/rig_plan.h"
+#include "client/source/plans/rig_words.h"
 
 namespace touchstone::cli {
 

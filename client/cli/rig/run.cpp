@@ -7,9 +7,9 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/rig/record.h"
 #include "client/cli/rig/rig.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/session_files.h"
 

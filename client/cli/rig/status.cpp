@@ -5,9 +5,9 @@
 
 #include "client/cli/common/terminal.h"
 #include "client/cli/rig/rig.h"
-#include "client/source/lab_units.h"
+#include "client/source/dataset/lab_units.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::cli {

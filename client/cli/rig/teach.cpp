@@ -10,7 +10,7 @@
 
 #include "client/cli/rig/rig.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "touchstone/v1/freedrive.grpc.pb.h"
 

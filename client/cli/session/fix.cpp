@@ -10,10 +10,10 @@
 
 #include "client/cli/session/image_set_fix.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/model/finger_name.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::cli {
 namespace {

@@ -7,15 +7,15 @@
 #include <cmath>
 #include <filesystem>
 
-#include "client/source/synced_file.h"
+#include "client/source/dataset/synced_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/image/photograph.h"
+#include "server/base/text/text.h"
+#include "server/image/photograph/photograph.h"
 #include "server/service/core/convert.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/emulated.h"
-#include "server/session/image_set_file.h"
-#include "server/session/images_csv.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/emulated.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 #include "touchstone/v1/source.pb.h"
 
 namespace touchstone::cli {

@@ -9,9 +9,9 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/image/encode.h"
-#include "server/session/image_set_file.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "client/cli/common/common.h"
-#include "server/session/image_set_fix.h"
+#include "server/session/images/image_set_fix.h"
 
 namespace touchstone::cli {
 

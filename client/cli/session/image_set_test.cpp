@@ -6,11 +6,11 @@
 
 #include "client/cli/session/image_set.h"
 #include "server/base/test_folder.h"
-#include "server/image/encode.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/emulated.h"
-#include "server/session/image_set_file.h"
-#include "server/session/images_csv.h"
+#include "server/image/encoding/encode.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/emulated.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

@@ -8,14 +8,14 @@
 
 #include "client/cli/common/interrupt.h"
 #include "client/cli/common/output_file.h"
-#include "client/source/errors.h"
-#include "client/source/image_set_files.h"
-#include "server/base/file_writer.h"
+#include "client/source/connection/errors.h"
+#include "client/source/plans/image_set_files.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/sessions/stored_session.h"
-#include "server/session/image_set_file.h"
-#include "server/session/image_set_hdf5.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {

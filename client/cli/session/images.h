@@ -6,7 +6,7 @@
 #include <absl/status/status.h>
 
 #include "client/cli/common/common.h"
-#include "client/source/connection.h"
+#include "client/source/connection/connection.h"
 #include "server/service/sessions/stored_session.h"
 
 namespace touchstone::cli {

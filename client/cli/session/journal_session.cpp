@@ -6,7 +6,7 @@
 #include "client/cli/common/output_file.h"
 #include "client/cli/session/images.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/sessions/journalled_session.h"
 #include "server/session/session_files.h"
 #include "server/session/session_images.h"

@@ -9,9 +9,9 @@
 #include <absl/status/statusor.h>
 
 #include "client/cli/common/common.h"
-#include "client/source/measurement_csv.h"
-#include "server/session/journal.h"
-#include "server/session/measurement_set.h"
+#include "client/source/dataset/measurement_csv.h"
+#include "server/session/journal/journal.h"
+#include "server/session/measurements/measurement_set.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::cli {

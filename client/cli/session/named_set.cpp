@@ -10,9 +10,9 @@
 #include "client/cli/session/images.h"
 #include "client/cli/session/journal_session.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/sessions/measured_set_message.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/cli/common/common.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::cli {

@@ -14,12 +14,12 @@
 #include "client/cli/session/journal_session.h"
 #include "client/cli/session/trash.h"
 #include "client/cli/session/verify.h"
-#include "client/source/touch_ids.h"
+#include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/session/image_set_file.h"
-#include "server/session/image_set_hdf5.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/image_set_hdf5.h"
 
 namespace touchstone::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/geometry/mesh_file.h"
+#include "server/base/text/text.h"
+#include "server/geometry/files/mesh_file.h"
 
 namespace touchstone::cli {
 namespace {

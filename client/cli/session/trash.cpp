@@ -4,7 +4,7 @@
 
 #include "client/cli/options/motion_options.h"
 #include "client/cli/session/journal_session.h"
-#include "client/source/lease_keeper.h"
+#include "client/source/connection/lease_keeper.h"
 #include "server/base/status.h"
 
 namespace touchstone::cli {

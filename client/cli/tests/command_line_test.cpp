@@ -13,8 +13,8 @@
 
 #include "client/cli/tests/real_binary_test.h"
 #include "client/cli/tests/test_server.h"
-#include "client/source/measurement_csv.h"
-#include "server/base/text.h"
+#include "client/source/dataset/measurement_csv.h"
+#include "server/base/text/text.h"
 #include "server/service/rpc/server.h"
 
 namespace touchstone::cli {

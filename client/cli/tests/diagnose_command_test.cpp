@@ -17,7 +17,7 @@
 
 #include "client/cli/tests/real_binary_test.h"
 #include "client/cli/tests/test_server.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 
 namespace touchstone::cli {
 namespace {

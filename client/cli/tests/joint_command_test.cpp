@@ -14,8 +14,8 @@
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/joint_test_set.h"
-#include "server/geometry/mesh_file.h"
-#include "server/session/image_set_file.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::cli {
 namespace {

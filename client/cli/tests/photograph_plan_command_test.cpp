@@ -11,9 +11,9 @@
 #include "client/cli/tests/real_binary_test.h"
 #include "server/base/sanitizers.h"
 #include "server/diagnosis/images/photo_test_set.h"
-#include "server/geometry/mesh_file.h"
-#include "server/session/image_set_file.h"
-#include "server/session/images_csv.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/images_csv.h"
 
 namespace touchstone::cli {
 namespace {

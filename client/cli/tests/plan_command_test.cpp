@@ -8,7 +8,7 @@
 
 #include "client/cli/tests/real_binary_test.h"
 #include "server/base/test_paths.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 
 namespace touchstone::cli {
 namespace {

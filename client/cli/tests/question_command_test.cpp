@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/tests/real_binary_test.h"
-#include "client/source/measurement_csv.h"
+#include "client/source/dataset/measurement_csv.h"
 
 namespace touchstone::cli {
 namespace {

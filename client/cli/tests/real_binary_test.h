@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 

@@ -15,10 +15,10 @@
 
 #include "client/cli/tests/real_binary_test.h"
 #include "client/cli/tests/test_server.h"
-#include "client/source/dataset_manifest.h"
-#include "server/base/file_writer.h"
+#include "client/source/dataset/dataset_manifest.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_tier.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {

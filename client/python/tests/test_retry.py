@@ -20,7 +20,7 @@ FAST = {"grpc.keepalive_time_ms": 1200, "grpc.keepalive_timeout_ms": 1000}
 
 
 def test_both_languages_have_the_numbers_that_are_documented():
-    header = (ROOT / "client/source/retry.h").read_text()
+    header = (ROOT / "client/source/connection/retry.h").read_text()
     of_cpp = {re.sub("([A-Z])", r"_\1", name)[1:].lower(): float(value)
               for name, value in re.findall(r"^inline constexpr double k(\w+) = ([\d.]+);", header, re.MULTILINE)}
     of_python = {name.lower(): value for name, value in vars(retry).items() if name.isupper() and name[0] != "_"}

@@ -114,7 +114,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 def whole_number(text: str) -> int:
-    """A count or a seed as the other commands read it (server/base/whole_number.h): "1000", "1_000_000", "1e6"; from 0 to 2^64 - 1."""
+    """A count or a seed as the other commands read it (server/base/text/whole_number.h): "1000", "1_000_000", "1e6"; from 0 to 2^64 - 1."""
     match = re.fullmatch(r"(\d+(?:_\d+)*)(?:\.(\d+))?(?:[eE]\+?(\d+))?", text, re.ASCII)
     fraction = (match[2] or "").rstrip("0") if match else ""
     exponent = int(match[3] or 0) - len(fraction) if match else -1

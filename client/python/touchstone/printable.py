@@ -1,4 +1,4 @@
-"""Text of sources, files and people, made fit for a terminal or a log: as `Printable` of server/base/printable.h."""
+"""Text of sources, files and people, made fit for a terminal or a log: as `Printable` of server/base/text/printable.h."""
 
 from __future__ import annotations
 

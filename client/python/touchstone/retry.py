@@ -1,6 +1,6 @@
 """What a client does when a source is lost, says nothing, or is full: for every call, before a stream and in it.
 
-Its twin is client/source/retry.h; tests/test_retry.py compares both, and the table in server/LIMITS.md.
+Its twin is client/source/connection/retry.h; tests/test_retry.py compares both, and the table in server/LIMITS.md.
 """
 
 from __future__ import annotations

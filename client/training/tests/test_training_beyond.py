@@ -13,8 +13,9 @@ pytest.importorskip("xgboost", reason="XGBoost is not installed; touchstone.trai
 
 import touchstone
 from touchstone.own_server import find_server
-from touchstone.training import calibration, ladder, ladder_words, plans, recognisers, sequential
+from touchstone.training import calibration, ladder, plans, recognisers, sequential
 from touchstone.training.experiments import other_rigs
+from touchstone.training.ladder import words as ladder_words
 from touchstone.training.prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
 from touchstone.training.touch_data import collect
 

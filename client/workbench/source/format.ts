@@ -1,4 +1,4 @@
-// Numbers as people read them. The rules are those of client/report/words.cpp.
+// Numbers as people read them. The rules are those of client/report/words/words.cpp.
 import type { DataReport, Kind, Value } from "./data/report";
 
 const minus = "\u2212";

@@ -9,13 +9,13 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/diagnosis/boards/board_search.h"
-#include "server/diagnosis/engine/fitted_values.h"
-#include "server/diagnosis/engine/ladder.h"
-#include "server/diagnosis/engine/resampled_covariance.h"
+#include "server/diagnosis/engine/fit/fitted_values.h"
+#include "server/diagnosis/engine/fit/resampled_covariance.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {

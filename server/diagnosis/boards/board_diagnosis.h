@@ -15,8 +15,8 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_set.h"
-#include "server/diagnosis/engine/parameter_estimate.h"
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/fit/parameter_estimate.h"
 #include "server/model/model.h"
 #include "server/uncertainty/budget.h"
 

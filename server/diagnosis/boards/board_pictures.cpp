@@ -12,10 +12,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/image/whole_picture.h"
-#include "server/session/camera_yaml.h"
-#include "server/session/image_set_file.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/whole_picture.h"
+#include "server/session/images/camera_yaml.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {

@@ -6,7 +6,7 @@
 #include <absl/strings/str_cat.h>
 #include <Eigen/Geometry>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {

@@ -11,7 +11,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_pose.h"
-#include "server/diagnosis/engine/observation_model.h"
+#include "server/diagnosis/engine/fit/observation_model.h"
 
 namespace touchstone::diagnosis::boards {
 

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/boards/board_test_set.h"
-#include "server/diagnosis/engine/fit.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/fit.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {

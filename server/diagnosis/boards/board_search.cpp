@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {

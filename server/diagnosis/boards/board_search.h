@@ -7,8 +7,8 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_rows.h"
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/fit/fit.h"
 
 namespace touchstone::diagnosis::boards {
 

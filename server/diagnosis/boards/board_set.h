@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::boards {
 

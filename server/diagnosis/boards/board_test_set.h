@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/boards/board_pose.h"
 #include "server/diagnosis/boards/board_set.h"
 #include "server/diagnosis/boards/lens.h"

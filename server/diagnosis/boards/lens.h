@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "server/image/photo_lens.h"
+#include "server/image/photograph/photo_lens.h"
 #include "server/model/model.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::boards {
 

@@ -9,18 +9,18 @@
 #include <cmath>
 #include <optional>
 
-#include "server/base/readable_time.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/readable_time.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
-#include "server/diagnosis/checks/duplicates.h"
 #include "server/diagnosis/checks/mesh_units.h"
 #include "server/diagnosis/checks/object_mistakes.h"
 #include "server/diagnosis/checks/part_mistakes.h"
-#include "server/diagnosis/checks/round_speed.h"
+#include "server/diagnosis/checks/rows/duplicates.h"
+#include "server/diagnosis/checks/rows/round_speed.h"
+#include "server/diagnosis/checks/rows/stale_rows.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/sorted_column.h"
-#include "server/diagnosis/checks/stale_rows.h"
 #include "server/diagnosis/checks/tried.h"
 #include "server/diagnosis/checks/two_mistakes.h"
 #include "server/diagnosis/selection/workspace.h"

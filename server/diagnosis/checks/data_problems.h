@@ -20,7 +20,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/input.h"
 
 namespace touchstone::diagnosis::checks {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/spoilt_test_file.h"

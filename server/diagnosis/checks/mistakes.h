@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
-#include "server/session/measurement_fix.h"
+#include "server/diagnosis/engine/competition/result.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 

@@ -8,8 +8,8 @@
 #include "server/base/test_paths.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/mesh_file.h"
-#include "server/session/measurement_fix.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
-#include "server/session/measurement_fix.h"
+#include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 

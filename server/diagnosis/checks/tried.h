@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/checks/trial.h"
 
 namespace touchstone::diagnosis::checks {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/parameterization.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/touches/prediction.h"
 
 namespace touchstone::diagnosis::design {

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/parameterization.h"
-#include "server/diagnosis/images/photo_cells.h"
-#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
+#include "server/diagnosis/images/rows/photo_rows.h"
 
 namespace touchstone::diagnosis::design {
 namespace {

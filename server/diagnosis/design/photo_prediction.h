@@ -13,7 +13,7 @@
 
 namespace touchstone::diagnosis::design {
 
-// A picture's cells (images/photo_cells.h), in standard deviations of their noise, along the directions in which any value
+// A picture's cells (images/pixels/photo_cells.h), in standard deviations of their noise, along the directions in which any value
 // of any model moves it: nothing else of a picture can tell the models apart to first order. One entry per model; the same
 // directions for all. NaN where a model cannot be photographed, or where the object leaves the picture or is hardly in it.
 // Pictures of more than kMaxSidePx along a side are predicted in smaller ones of as much noise per angle.

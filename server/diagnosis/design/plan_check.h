@@ -8,7 +8,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/design/propose.h"
-#include "server/diagnosis/engine/detectability.h"
+#include "server/diagnosis/engine/competition/detectability.h"
 #include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis::design {

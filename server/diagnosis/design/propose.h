@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/design/sequential_choice.h"
-#include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/model/model.h"
 #include "server/touch/commanded_touch.h"

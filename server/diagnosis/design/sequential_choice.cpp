@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 
 namespace touchstone::diagnosis::design {
 namespace {

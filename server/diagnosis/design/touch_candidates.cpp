@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/touches/prediction.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/distributions/two_samples.h"
 
 namespace touchstone::diagnosis::distributions {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "server/geometry/surface.h"
-#include "server/session/measurement_set.h"
+#include "server/geometry/surface/surface.h"
+#include "server/session/measurements/measurement_set.h"
 #include "server/touch/plan.h"
 
 namespace touchstone::diagnosis::distributions {

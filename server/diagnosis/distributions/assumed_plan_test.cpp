@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/distributions/pose_free_rank.h"
 #include "server/diagnosis/distributions/pose_free_test_set.h"
 

@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/distributions/pose_free_experiment.h"
 #include "server/model/model.h"
 

@@ -15,7 +15,7 @@
 #include "server/diagnosis/distributions/pose_free_description.h"
 #include "server/diagnosis/distributions/round_findings.h"
 #include "server/diagnosis/input.h"
-#include "server/diagnosis/residuals/histogram_bins.h"
+#include "server/diagnosis/residuals/distribution/histogram_bins.h"
 
 namespace touchstone::diagnosis::distributions {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/units.h"
 
 namespace touchstone::diagnosis::distributions {

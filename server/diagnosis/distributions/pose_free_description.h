@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/diagnosis/distributions/pose_free_rank.h"
-#include "server/diagnosis/residuals/histogram_bins.h"
+#include "server/diagnosis/residuals/distribution/histogram_bins.h"
 
 namespace touchstone::diagnosis::distributions {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"

@@ -7,9 +7,9 @@
 #include <complex>
 #include <numeric>
 
-#include "server/base/random.h"
-#include "server/base/readable_time.h"
-#include "server/diagnosis/residuals/permutation.h"
+#include "server/base/numbers/random.h"
+#include "server/base/text/readable_time.h"
+#include "server/diagnosis/residuals/distribution/permutation.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::distributions {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {

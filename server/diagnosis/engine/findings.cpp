@@ -1,8 +1,8 @@
 #include "server/diagnosis/engine/findings.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/candidate_ranking.h"
-#include "server/diagnosis/engine/step_order.h"
+#include "server/diagnosis/engine/competition/candidate_ranking.h"
+#include "server/diagnosis/engine/ladder/step_order.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {

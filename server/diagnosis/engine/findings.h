@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/modality.h"
 
 namespace touchstone::diagnosis::engine {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::engine {
 

@@ -9,9 +9,9 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/engine/result.h"
-#include "server/diagnosis/engine/stepwise_search.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
-#include "server/base/distributions.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::engine {
 

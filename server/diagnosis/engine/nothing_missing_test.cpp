@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {

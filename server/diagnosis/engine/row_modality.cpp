@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::engine {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/diagnosis/engine/modality.h"
 
 namespace touchstone::diagnosis::engine {

@@ -5,8 +5,8 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_ladder.h"
-#include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/search/photo_quality.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

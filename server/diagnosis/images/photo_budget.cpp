@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/fitted_values.h"
-#include "server/diagnosis/images/photo_cells.h"
-#include "server/diagnosis/images/photo_flow.h"
-#include "server/diagnosis/images/photo_rows.h"
+#include "server/diagnosis/engine/fit/fitted_values.h"
+#include "server/diagnosis/images/pixels/photo_cells.h"
+#include "server/diagnosis/images/rows/photo_flow.h"
+#include "server/diagnosis/images/rows/photo_rows.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

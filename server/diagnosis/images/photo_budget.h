@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/images/photographs.h"
 #include "server/uncertainty/budget.h"
 

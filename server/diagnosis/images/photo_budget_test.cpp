@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/engine/parameterization.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/photo_test_set.h"
 
 namespace touchstone::diagnosis::images {

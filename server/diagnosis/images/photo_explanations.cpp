@@ -1,7 +1,7 @@
 #include "server/diagnosis/images/photo_explanations.h"
 
-#include "server/diagnosis/images/image_field.h"
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/pixels/image_field.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 

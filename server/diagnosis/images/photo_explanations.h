@@ -1,8 +1,8 @@
 // The explanations of photographs that are left after a diagnosis: what further pictures are to tell apart.
 #pragma once
 
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/images/pixel_noise.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/images/pixels/pixel_noise.h"
 
 namespace touchstone::diagnosis::images {
 

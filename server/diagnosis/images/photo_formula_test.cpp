@@ -9,8 +9,8 @@
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
-#include "server/diagnosis/images/photo_term_scores.h"
 #include "server/diagnosis/images/photo_test_set.h"
+#include "server/diagnosis/images/terms/photo_term_scores.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

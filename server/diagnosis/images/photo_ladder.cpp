@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/candidate_ranking.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/competition/candidate_ranking.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_budget.h"
-#include "server/diagnosis/images/photo_covariates.h"
-#include "server/diagnosis/images/photo_formula.h"
-#include "server/diagnosis/images/photo_rest_kinds.h"
-#include "server/diagnosis/images/photo_uneven_noise.h"
+#include "server/diagnosis/images/rows/photo_covariates.h"
+#include "server/diagnosis/images/rows/photo_rest_kinds.h"
+#include "server/diagnosis/images/rows/photo_uneven_noise.h"
+#include "server/diagnosis/images/terms/photo_formula.h"
 
 namespace touchstone::diagnosis::images {
 namespace {

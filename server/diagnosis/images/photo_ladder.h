@@ -1,9 +1,9 @@
 // From a selected explanation to what is said of it: the error after each step, refits, what remains, the improved model.
 #pragma once
 
-#include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photo_search.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
+#include "server/diagnosis/images/search/photo_quality.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -11,11 +11,11 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/input.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
-#include "server/image/simulate_photo.h"
+#include "server/geometry/shapes/supershape.h"
+#include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::images {
 

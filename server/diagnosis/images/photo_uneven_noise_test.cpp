@@ -1,12 +1,12 @@
 // Noise of pixels that differs between parts of a set is told as that, and no effect is named for it with confidence.
-#include "server/diagnosis/images/photo_uneven_noise.h"
+#include "server/diagnosis/images/rows/photo_uneven_noise.h"
 
 #include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photo_test_set.h"
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/parameter_estimate.h"
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/fit/parameter_estimate.h"
 #include "server/model/model.h"
-#include "server/session/image_set.h"
+#include "server/session/images/image_set.h"
 #include "server/uncertainty/budget.h"
 
 namespace touchstone::diagnosis::images {

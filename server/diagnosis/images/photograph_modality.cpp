@@ -2,7 +2,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
-#include "server/diagnosis/images/photo_quality.h"
+#include "server/diagnosis/images/search/photo_quality.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/diagnosis/engine/modality.h"
-#include "server/diagnosis/images/photo_search.h"
+#include "server/diagnosis/images/search/photo_search.h"
 
 namespace touchstone::diagnosis::images {
 

@@ -8,10 +8,10 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/images/photo_explanations.h"
-#include "server/diagnosis/images/pixel_noise.h"
+#include "server/diagnosis/images/pixels/pixel_noise.h"
 #include "server/diagnosis/input.h"
-#include "server/image/simulate_photo.h"
-#include "server/session/image_set.h"
+#include "server/image/photograph/simulate_photo.h"
+#include "server/session/images/image_set.h"
 
 namespace touchstone::diagnosis::images {
 

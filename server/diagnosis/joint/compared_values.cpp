@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {

@@ -8,7 +8,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Core>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 
 namespace touchstone::diagnosis::joint {
 

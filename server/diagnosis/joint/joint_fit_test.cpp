@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/diagnosis/engine/linear_test_model.h"
+#include "server/diagnosis/engine/fit/linear_test_model.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::joint {

@@ -5,9 +5,9 @@
 #include <map>
 #include <utility>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {

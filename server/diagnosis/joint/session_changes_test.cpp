@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/diagnosis/engine/linear_test_model.h"
+#include "server/diagnosis/engine/fit/linear_test_model.h"
 #include "server/diagnosis/engine/row_modality.h"
 #include "server/effects/all_effects.h"
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::joint {

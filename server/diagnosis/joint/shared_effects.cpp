@@ -8,7 +8,7 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/joint/shared_search.h"
 
 namespace touchstone::diagnosis::joint {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {

@@ -1,9 +1,9 @@
-#include "server/diagnosis/report/from_distributions.h"
+#include "server/diagnosis/report/kinds/from_distributions.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {

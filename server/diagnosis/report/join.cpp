@@ -9,9 +9,9 @@
 #include <iterator>
 #include <utility>
 
-#include "server/diagnosis/engine/candidates.h"
-#include "server/diagnosis/report/message_parts.h"
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/engine/search/candidates.h"
+#include "server/diagnosis/report/message/message_parts.h"
+#include "server/diagnosis/report/words/summary.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::report {

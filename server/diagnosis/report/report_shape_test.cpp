@@ -7,11 +7,11 @@
 #include <map>
 #include <set>
 
-#include "server/diagnosis/report/example_diagnosis.h"
-#include "server/diagnosis/report/from_boards.h"
-#include "server/diagnosis/report/from_photographs.h"
 #include "server/diagnosis/report/join.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/kinds/example_diagnosis.h"
+#include "server/diagnosis/report/kinds/from_boards.h"
+#include "server/diagnosis/report/kinds/from_photographs.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "touchstone/v1/diagnosis.pb.h"
 
 namespace touchstone::diagnosis::report {

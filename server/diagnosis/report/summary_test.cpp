@@ -1,10 +1,10 @@
-#include "server/diagnosis/report/summary.h"
+#include "server/diagnosis/report/words/summary.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/report/example_diagnosis.h"
 #include "server/diagnosis/report/join.h"
+#include "server/diagnosis/report/kinds/example_diagnosis.h"
 
 namespace touchstone::diagnosis::report {
 namespace {

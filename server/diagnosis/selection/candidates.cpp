@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/diagnosis/engine/parameterization.h"
+#include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "server/diagnosis/engine/candidates.h"
+#include "server/diagnosis/engine/search/candidates.h"
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/touches/observations.h"
 

@@ -7,7 +7,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/selection/session/time_structure.h"
-#include "server/effects/lookup.h"
+#include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

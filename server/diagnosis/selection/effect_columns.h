@@ -6,7 +6,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Core>
 
-#include "server/diagnosis/engine/stepwise_search.h"
+#include "server/diagnosis/engine/search/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis::selection {

@@ -8,11 +8,11 @@
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
-#include "server/base/decompositions.h"
-#include "server/base/distributions.h"
-#include "server/base/random.h"
-#include "server/base/readable_time.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
+#include "server/base/text/readable_time.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/session/repeats.h"
 #include "server/diagnosis/selection/session/round_structure.h"

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -1,7 +1,7 @@
 // How good a model is: error, error on touches left out, lack of fit.
 #pragma once
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/selection/selection.h"
 
 namespace touchstone::diagnosis::selection {
@@ -22,7 +22,7 @@ bool HasRepeats(const touches::SumOfSquares& error);
 double HeldOutRatio(const engine::Fit& fit, double heldout_rmse_s);
 
 // Of the model of a fit (or of part of its effects), on all touches; the ratio of the held-out error to the error
-// comes from the touches of the search, with every value fitted anew (engine/held_out.h).
+// comes from the touches of the search, with every value fitted anew (engine/fit/held_out.h).
 absl::StatusOr<engine::Quality> QualityOf(const Workspace& workspace, const engine::Fit& fit,
                                           const std::vector<double>& residuals);
 

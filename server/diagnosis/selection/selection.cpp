@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/effect_columns.h"
@@ -14,7 +14,7 @@
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
-#include "server/diagnosis/touches/noise_sample.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

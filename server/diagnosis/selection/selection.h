@@ -10,14 +10,14 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/competition.h"
+#include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/selection/curves/formula_terms.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/scatter/noise_memory.h"
 #include "server/diagnosis/selection/session/partial_offset.h"
 #include "server/diagnosis/selection/workspace.h"
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 
 namespace touchstone::diagnosis::selection {
 

@@ -5,12 +5,12 @@
 #include <map>
 #include <numeric>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
-#include "server/diagnosis/touches/noise_sample.h"
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

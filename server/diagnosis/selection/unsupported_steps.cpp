@@ -1,7 +1,7 @@
 #include "server/diagnosis/selection/unsupported_steps.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/engine/linear_test_model.h"
+#include "server/diagnosis/engine/fit/linear_test_model.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {

@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/input.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 

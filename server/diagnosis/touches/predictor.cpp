@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "server/base/status.h"
-#include "server/effects/surface_departure.h"
+#include "server/effects/contact/surface_departure.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::diagnosis::touches {

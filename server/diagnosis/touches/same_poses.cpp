@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {

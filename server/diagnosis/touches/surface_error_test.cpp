@@ -1,11 +1,11 @@
-#include "server/diagnosis/engine/likelihood.h"
+#include "server/diagnosis/engine/fit/likelihood.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/touches/predictor.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 #include "server/diagnosis/touches/touch_observation_model.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/observation_model.h"
-#include "server/diagnosis/engine/smooth_error.h"
+#include "server/diagnosis/engine/fit/observation_model.h"
+#include "server/diagnosis/engine/fit/smooth_error.h"
 #include "server/diagnosis/touches/contrasts.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/diagnosis/touches/predictor.h"

@@ -8,10 +8,10 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "server/gateway/arm/big_endian.h"
-#include "server/gateway/arm/dashboard_client.h"
-#include "server/gateway/arm/fake_server.h"
-#include "server/gateway/arm/rtde_client.h"
+#include "server/gateway/arm/protocol/big_endian.h"
+#include "server/gateway/arm/protocol/dashboard_client.h"
+#include "server/gateway/arm/protocol/fake_server.h"
+#include "server/gateway/arm/protocol/rtde_client.h"
 #include "server/gateway/arm/ur_arm.h"
 
 namespace touchstone::gateway::arm {

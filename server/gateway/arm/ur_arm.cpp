@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
-#include "server/gateway/arm/cartesian_speed.h"
+#include "server/gateway/arm/motion/cartesian_speed.h"
 #include "server/gateway/arm/ur_arm_on_tcp.h"
 #include "server/gateway/arm/ur_modes.h"
 

@@ -8,8 +8,8 @@
 #include <absl/status/statusor.h>
 
 #include "server/gateway/arm/arm.h"
-#include "server/gateway/arm/motion_limits.h"
-#include "server/gateway/arm/ur_script.h"
+#include "server/gateway/arm/kinematics/motion_limits.h"
+#include "server/gateway/arm/motion/ur_script.h"
 #include "server/gateway/calibration/calibration.h"
 
 namespace touchstone::gateway::arm {

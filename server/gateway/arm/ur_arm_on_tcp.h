@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "server/gateway/arm/arm_body.h"
-#include "server/gateway/arm/dashboard_client.h"
-#include "server/gateway/arm/registers.h"
-#include "server/gateway/arm/rtde_client.h"
-#include "server/gateway/arm/script_port.h"
+#include "server/gateway/arm/kinematics/arm_body.h"
+#include "server/gateway/arm/protocol/dashboard_client.h"
+#include "server/gateway/arm/protocol/registers.h"
+#include "server/gateway/arm/protocol/rtde_client.h"
+#include "server/gateway/arm/protocol/script_port.h"
 #include "server/gateway/arm/state_history.h"
 #include "server/gateway/arm/ur_arm.h"
 

@@ -12,9 +12,9 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "server/base/file_writer.h"
-#include "server/base/printable.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::gateway::audit {
 namespace {

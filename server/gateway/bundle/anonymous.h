@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/gateway/bundle/aliases.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::gateway::bundle {
 

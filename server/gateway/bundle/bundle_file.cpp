@@ -13,10 +13,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/base/file_writer.h"
-#include "server/base/printable.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::gateway::bundle {
 namespace {

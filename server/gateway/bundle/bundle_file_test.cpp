@@ -10,7 +10,7 @@
 #include <fstream>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::gateway::bundle {
 namespace {

@@ -11,10 +11,10 @@
 #include <filesystem>
 #include <tuple>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/version.h"
+#include "server/base/text/text.h"
 #include "server/gateway/bundle/anonymous.h"
 #include "server/gateway/bundle/bundle_file.h"
 #include "server/gateway/bundle/bundle_names.h"

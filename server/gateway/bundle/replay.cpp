@@ -8,9 +8,9 @@
 
 #include <filesystem>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/gateway/bundle/bundle_names.h"
 
 namespace touchstone::gateway::bundle {

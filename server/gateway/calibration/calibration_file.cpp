@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/geometry/pose.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::gateway::calibration {
 namespace {

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/file_number.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/file_number.h"
+#include "server/base/text/text.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::gateway::calibration {

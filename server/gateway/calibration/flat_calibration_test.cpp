@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "server/base/nan.h"
-#include "server/base/random.h"
+#include "server/base/numbers/nan.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/geometry/pose.h"

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/geometry/surface.h"
+#include "server/geometry/surface/surface.h"
 
 namespace touchstone::gateway::calibration {
 

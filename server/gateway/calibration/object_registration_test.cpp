@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/units.h"
 
 namespace touchstone::gateway::calibration {

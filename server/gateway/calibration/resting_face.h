@@ -7,7 +7,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Geometry>
 
-#include "server/geometry/mesh.h"
+#include "server/geometry/mesh/mesh.h"
 
 namespace touchstone::gateway::calibration {
 

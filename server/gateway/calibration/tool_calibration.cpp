@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 
 namespace touchstone::gateway::calibration {
 namespace {

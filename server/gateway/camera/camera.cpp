@@ -15,7 +15,7 @@
 #include "server/base/check.h"
 #include "server/base/status.h"
 #include "server/gateway/camera/camera_kinds.h"
-#include "server/image/whole_picture.h"
+#include "server/image/encoding/whole_picture.h"
 
 namespace touchstone::gateway::camera {
 namespace {

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "server/gateway/timing/change_notifier.h"
-#include "server/image/photograph.h"
+#include "server/image/photograph/photograph.h"
 
 namespace touchstone::gateway::camera {
 

@@ -14,9 +14,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
 #include "server/base/test_tier.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/gateway/camera/fake_stream.h"
 #include "server/gateway/camera/mjpeg_server.h"
 

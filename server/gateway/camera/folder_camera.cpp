@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <opencv2/core.hpp>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/camera/camera_kinds.h"
 
 namespace touchstone::gateway::camera {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "firmware/core/effector.h"
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_folder.h"
 
 namespace touchstone::gateway::effector {

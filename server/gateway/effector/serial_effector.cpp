@@ -13,7 +13,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::gateway::effector {

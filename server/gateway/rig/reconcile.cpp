@@ -8,8 +8,8 @@
 
 #include "server/base/status.h"
 #include "server/gateway/arm/ur_modes.h"
+#include "server/gateway/rig/results/touch_result.h"
 #include "server/gateway/rig/rig.h"
-#include "server/gateway/rig/touch_result.h"
 
 namespace touchstone::gateway {
 namespace {

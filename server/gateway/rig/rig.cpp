@@ -10,9 +10,9 @@
 #include <random>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/arm/ur_modes.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 
 namespace touchstone::gateway {
 namespace {

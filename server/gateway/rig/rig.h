@@ -20,17 +20,17 @@
 #include <absl/status/statusor.h>
 
 #include "server/gateway/arm/arm.h"
-#include "server/gateway/arm/motion_planner.h"
+#include "server/gateway/arm/motion/motion_planner.h"
 #include "server/gateway/audit/audit_log.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
-#include "server/gateway/rig/arm_watch.h"
-#include "server/gateway/rig/camera_pose.h"
-#include "server/gateway/rig/heartbeats.h"
-#include "server/gateway/rig/session_clock.h"
-#include "server/gateway/rig/unwritten_outcomes.h"
-#include "server/geometry/mesh.h"
-#include "server/session/journal.h"
+#include "server/gateway/rig/results/camera_pose.h"
+#include "server/gateway/rig/watches/arm_watch.h"
+#include "server/gateway/rig/watches/heartbeats.h"
+#include "server/gateway/rig/watches/session_clock.h"
+#include "server/gateway/rig/watches/unwritten_outcomes.h"
+#include "server/geometry/mesh/mesh.h"
+#include "server/session/journal/journal.h"
 #include "server/source/rig_device.h"
 
 namespace touchstone::gateway {

@@ -7,11 +7,11 @@
 #include <atomic>
 #include <future>
 
-#include "server/base/manual_clock.h"
 #include "server/base/test_folder.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/gateway/rig/idle_effector.h"
 #include "server/gateway/rig/rig.h"
-#include "server/gateway/rig/scripted_arm.h"
+#include "server/gateway/rig/watches/scripted_arm.h"
 
 namespace touchstone::gateway {
 namespace {

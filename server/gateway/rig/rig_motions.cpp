@@ -8,9 +8,9 @@
 #include "server/base/status.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
-#include "server/gateway/rig/run_command.h"
+#include "server/gateway/rig/watches/run_command.h"
 #include "server/geometry/pose.h"
-#include "server/image/encode.h"
+#include "server/image/encoding/encode.h"
 
 namespace touchstone::gateway {
 namespace {

@@ -6,10 +6,10 @@
 #include <limits>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/gateway/arm/ur_modes.h"
-#include "server/gateway/rig/force_guard.h"
 #include "server/gateway/rig/rig.h"
+#include "server/gateway/rig/watches/force_guard.h"
 
 namespace touchstone::gateway {
 namespace {

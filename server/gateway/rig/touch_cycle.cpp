@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/gateway/rig/results/touch_result.h"
+#include "server/gateway/rig/results/touch_series.h"
 #include "server/gateway/rig/rig.h"
-#include "server/gateway/rig/touch_result.h"
-#include "server/gateway/rig/touch_series.h"
-#include "server/session/touch_series.h"
+#include "server/session/recorded/touch_series.h"
 
 namespace touchstone::gateway {
 absl::StatusOr<session::JournalResult> Rig::MakeTouch(const arm::PlannedTouch& plan, uint32_t program_id,

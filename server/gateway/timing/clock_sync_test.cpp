@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
 

@@ -5,7 +5,7 @@
 
 #include <absl/status/status.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::gateway::timing {
 

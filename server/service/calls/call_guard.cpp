@@ -1,7 +1,7 @@
 #include "server/service/calls/call_guard.h"
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 
 namespace touchstone::service {
 

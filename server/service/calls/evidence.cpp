@@ -9,13 +9,13 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/geometry/mesh_file.h"
+#include "server/base/text/text.h"
+#include "server/geometry/files/mesh_file.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/sent_model.h"
 #include "server/service/sessions/measured_set_message.h"
 #include "server/service/sessions/stored_session.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::service {
 namespace {

@@ -3,8 +3,8 @@
 #include <absl/strings/str_cat.h>
 #include <openssl/rand.h>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 
 namespace touchstone::service {
 namespace {

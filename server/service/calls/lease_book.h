@@ -6,7 +6,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 #include "server/service/core/access.h"
 #include "touchstone/v1/control.pb.h"
 

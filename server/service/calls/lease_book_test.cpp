@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/base/manual_clock.h"
+#include "server/base/threads/manual_clock.h"
 
 namespace touchstone::service {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/session/csv_fields.h"
+#include "server/session/csv/csv_fields.h"
 
 namespace touchstone::service {
 

@@ -19,8 +19,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/service/calls/wire_count.h"
 #include "server/service/core/convert.h"
 #include "server/service/options/limits.h"

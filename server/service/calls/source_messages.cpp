@@ -2,7 +2,7 @@
 #include "server/service/calls/source_messages.h"
 
 #include "server/service/core/convert.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::service {

@@ -7,9 +7,9 @@
 #include <limits>
 #include <set>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
 #include "server/uncertainty/posterior_message.h"

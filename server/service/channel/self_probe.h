@@ -9,7 +9,7 @@
 
 #include <grpcpp/client_context.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::service {
 

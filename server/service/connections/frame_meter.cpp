@@ -3,7 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
+#include "server/base/text/over_limit.h"
 
 namespace touchstone::service {
 namespace {

@@ -9,7 +9,7 @@
 #include <ctime>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/connections/openssl_objects.h"
 
 namespace touchstone::service {

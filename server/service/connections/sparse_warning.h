@@ -5,7 +5,7 @@
 #include <mutex>
 #include <string>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::service {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 
 namespace touchstone::service {
 

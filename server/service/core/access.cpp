@@ -5,9 +5,9 @@
 #include <grpc/grpc_security_constants.h>
 #include <spdlog/spdlog.h>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/service/connections/certificate_stamp.h"
 #include "server/service/core/access_credentials.h"
 #include "server/service/core/metrics.h"

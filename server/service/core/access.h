@@ -12,7 +12,7 @@
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server_context.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 #include "server/service/connections/file_stamp.h"
 #include "server/service/connections/server_certificates.h"
 #include "server/service/connections/sparse_warning.h"

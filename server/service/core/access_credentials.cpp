@@ -7,7 +7,7 @@
 #include <grpcpp/support/slice.h>
 
 #include "server/base/check.h"
-#include "server/base/printable.h"
+#include "server/base/text/printable.h"
 #include "server/service/connections/certificate_stamp.h"
 #include "server/service/core/access.h"
 

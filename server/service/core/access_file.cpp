@@ -12,7 +12,7 @@
 
 #include "server/base/check.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::service {
 namespace {

@@ -10,8 +10,8 @@
 #include <fstream>
 #include <utility>
 
-#include "server/base/memory_limit.h"
-#include "server/base/over_limit.h"
+#include "server/base/process/memory_limit.h"
+#include "server/base/text/over_limit.h"
 #include "server/service/connections/relayed_peer.h"
 #include "server/service/options/limits.h"
 

@@ -15,7 +15,7 @@
 #include <absl/strings/string_view.h>
 #include <grpcpp/server_context.h>
 
-#include "server/base/clock.h"
+#include "server/base/threads/clock.h"
 #include "server/service/connections/token_bucket.h"
 
 namespace touchstone::service {

@@ -9,9 +9,9 @@
 #include <chrono>
 #include <iterator>
 
-#include "server/base/out_of_memory.h"
-#include "server/base/over_limit.h"
-#include "server/base/printable.h"
+#include "server/base/process/out_of_memory.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/printable.h"
 #include "server/service/core/access.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/metrics.h"

@@ -2,10 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 #include "server/service/core/sent_model.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 
 namespace touchstone::service {
 

@@ -6,9 +6,9 @@
 
 #include <filesystem>
 
-#include "server/base/new_file.h"
+#include "server/base/files/new_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 #include "server/source/request_checks.h"
 

@@ -13,8 +13,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/thread_pool.h"
-#include "server/base/version.h"
+#include "server/base/process/version.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/model/model.h"
 #include "server/service/core/access.h"
 #include "server/service/core/admission.h"

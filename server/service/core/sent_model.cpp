@@ -2,10 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/effects/all_effects.h"
-#include "server/model/yaml_tree.h"
+#include "server/model/yaml/yaml_tree.h"
 
 namespace touchstone::service {
 namespace {

@@ -6,7 +6,7 @@
 #include "server/geometry/pose.h"
 #include "server/service/calls/call_guard.h"
 #include "server/service/core/convert.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 
 namespace touchstone::service {
 

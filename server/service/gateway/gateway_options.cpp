@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/service/core/resources.h"
 #include "server/service/gateway/gateway_options.h"

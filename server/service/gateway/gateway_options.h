@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/gateway/arm/motion_limits.h"
+#include "server/gateway/arm/kinematics/motion_limits.h"
 #include "server/gateway/camera/camera.h"
 #include "server/gateway/effector/effector.h"
 #include "server/service/options/server_options.h"

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/bundle/replay.h"

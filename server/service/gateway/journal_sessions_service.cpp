@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/calls/list_page.h"
 #include "server/service/core/convert.h"
 #include "server/service/sessions/journalled_session.h"

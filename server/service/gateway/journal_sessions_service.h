@@ -4,7 +4,7 @@
 #include "server/gateway/audit/audit_log.h"
 #include "server/service/calls/lease_book.h"
 #include "server/service/core/resources.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 #include "touchstone/v1/sessions.grpc.pb.h"
 
 namespace touchstone::service {

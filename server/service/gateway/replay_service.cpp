@@ -2,13 +2,13 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/gateway/calibration/calibration.h"
 #include "server/gateway/calibration/resting_face.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "server/source/physical_source.h"
 
 namespace touchstone::service {

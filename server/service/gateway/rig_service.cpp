@@ -5,14 +5,14 @@
 
 #include <algorithm>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/printable.h"
+#include "server/base/text/text.h"
 #include "server/geometry/pose.h"
 #include "server/service/calls/call_guard.h"
 #include "server/service/connections/relayed_peer.h"
 #include "server/service/core/convert.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "server/source/request_checks.h"
 
 namespace touchstone::service {

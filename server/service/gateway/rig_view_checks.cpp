@@ -1,14 +1,14 @@
 // Rig.CheckViews: every check of a photograph, without motion.
 #include <absl/strings/str_cat.h>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/geometry/pose.h"
-#include "server/image/renderer.h"
+#include "server/image/renderers/renderer.h"
 #include "server/service/calls/source_messages.h"
 #include "server/service/core/convert.h"
 #include "server/service/gateway/rig_service.h"
-#include "server/session/base_pose.h"
+#include "server/session/recorded/base_pose.h"
 #include "server/source/physical_source.h"
 
 namespace touchstone::service {

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::service {
 namespace {

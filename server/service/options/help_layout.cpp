@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "server/base/wrapped_text.h"
+#include "server/base/text/wrapped_text.h"
 
 namespace touchstone::service {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
+#include "server/base/text/over_limit.h"
 #include "server/service/options/option_table.h"
 
 namespace touchstone::service {

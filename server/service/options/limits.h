@@ -10,7 +10,7 @@
 #include <absl/strings/string_view.h>
 #include <absl/types/span.h>
 
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 #include "server/source/source_limits.h"
 
 namespace touchstone::service {

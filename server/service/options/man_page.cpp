@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "server/base/version.h"
+#include "server/base/process/version.h"
 
 namespace touchstone::service {
 namespace {

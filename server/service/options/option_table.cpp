@@ -27,10 +27,10 @@
 #include <limits>
 #include <optional>
 
+#include "server/base/process/version.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/base/version.h"
-#include "server/base/whole_number.h"
+#include "server/base/text/text.h"
+#include "server/base/text/whole_number.h"
 #include "server/service/options/help_layout.h"
 #include "server/service/options/man_page.h"
 

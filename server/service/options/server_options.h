@@ -7,8 +7,8 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/clock.h"
-#include "server/image/renderer.h"
+#include "server/base/threads/clock.h"
+#include "server/image/renderers/renderer.h"
 #include "server/service/options/access_options.h"
 #include "server/service/options/limits.h"
 #include "server/source/object_store.h"

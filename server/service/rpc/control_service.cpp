@@ -3,8 +3,8 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
-#include "server/base/printable.h"
 #include "server/base/status.h"
+#include "server/base/text/printable.h"
 #include "server/service/connections/relayed_peer.h"
 #include "server/service/core/convert.h"
 

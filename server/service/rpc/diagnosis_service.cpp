@@ -10,12 +10,12 @@
 #include <mutex>
 #include <thread>
 
-#include "server/base/over_limit.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
 #include "server/effects/all_effects.h"
 #include "server/service/calls/evidence.h"
 #include "server/service/core/convert.h"

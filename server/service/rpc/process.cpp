@@ -16,8 +16,8 @@
 #include <memory>
 #include <thread>
 
-#include "server/base/printable.h"
-#include "server/base/stop_signals.h"
+#include "server/base/process/stop_signals.h"
+#include "server/base/text/printable.h"
 #include "server/service/channel/self_probe.h"
 
 namespace touchstone::service {

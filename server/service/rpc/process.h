@@ -5,7 +5,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/base/stop_signals.h"
+#include "server/base/process/stop_signals.h"
 #include "server/service/connections/connection_acceptor.h"
 #include "server/service/options/server_options.h"
 

@@ -4,7 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/effects/all_effects.h"
 #include "server/service/calls/request_guard.h"
 #include "server/service/core/resources.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/service/core/resources.h"
 #include "server/service/options/option_table.h"
 

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "grpc/health/v1/health.grpc.pb.h"
-#include "server/base/tcp_listen.h"
+#include "server/base/process/tcp_listen.h"
 #include "server/service/channel/host_port.h"
 #include "server/service/core/metrics.h"
 #include "server/service/core/resources.h"

@@ -7,7 +7,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/service/sessions/stored_session.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::service {
 

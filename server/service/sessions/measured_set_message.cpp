@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "server/base/status.h"
-#include "server/session/session_measurements.h"
+#include "server/session/measurements/measurement_checks.h"
 
 namespace touchstone::service {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 #include "touchstone/v1/sessions.pb.h"
 
 namespace touchstone::service {

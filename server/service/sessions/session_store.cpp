@@ -11,10 +11,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/base/file_writer.h"
-#include "server/base/new_file.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/files/new_file.h"
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/source/request_checks.h"
 
 namespace touchstone::service {

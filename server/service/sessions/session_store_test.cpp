@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::service {
 namespace {

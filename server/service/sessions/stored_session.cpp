@@ -7,11 +7,11 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
-#include "server/session/csv_fields.h"
-#include "server/session/image_set_file.h"
-#include "server/session/images_csv.h"
-#include "server/session/measurement_set.h"
+#include "server/base/text/text.h"
+#include "server/session/csv/csv_fields.h"
+#include "server/session/images/image_set_file.h"
+#include "server/session/images/images_csv.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::service {
 namespace {

@@ -9,7 +9,7 @@
 #include <absl/status/statusor.h>
 #include <absl/strings/string_view.h>
 
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 #include "touchstone/v1/diagnosis.pb.h"
 #include "touchstone/v1/sessions.pb.h"
 

@@ -11,8 +11,8 @@
 #include <mutex>
 #include <thread>
 
-#include "server/base/file_writer.h"
-#include "server/base/manual_clock.h"
+#include "server/base/files/file_writer.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/service/core/access.h"
 #include "server/service/rpc/server.h"
 #include "server/service/tests/test_call.h"

@@ -9,9 +9,9 @@
 
 #include <set>
 
-#include "server/base/over_limit.h"
 #include "server/base/test_paths.h"
-#include "server/base/text.h"
+#include "server/base/text/over_limit.h"
+#include "server/base/text/text.h"
 #include "server/service/rpc/server.h"
 #include "server/service/rpc/server_flags.h"
 #include "touchstone/v1/source.grpc.pb.h"

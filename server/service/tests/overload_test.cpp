@@ -10,10 +10,10 @@
 #include <fstream>
 #include <thread>
 
-#include "server/base/manual_clock.h"
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
-#include "server/image/encode.h"
+#include "server/base/threads/manual_clock.h"
+#include "server/image/encoding/encode.h"
 #include "server/service/rpc/server.h"
 #include "touchstone/v1/control.grpc.pb.h"
 #include "touchstone/v1/diagnosis.grpc.pb.h"

@@ -13,8 +13,8 @@
 #include <future>
 #include <string>
 
-#include "server/base/manual_clock.h"
 #include "server/base/test_tier.h"
+#include "server/base/threads/manual_clock.h"
 #include "server/service/rpc/server.h"
 
 namespace touchstone::service {

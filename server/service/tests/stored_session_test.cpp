@@ -7,12 +7,12 @@
 #include <filesystem>
 
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
-#include "server/image/encode.h"
+#include "server/base/text/text.h"
+#include "server/image/encoding/encode.h"
 #include "server/service/calls/evidence.h"
 #include "server/service/core/resources.h"
 #include "server/service/sessions/session_store.h"
-#include "server/session/image_set_file.h"
+#include "server/session/images/image_set_file.h"
 
 namespace touchstone::service {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "server/base/check.h"
 #include "server/base/test_folder.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::service {
 

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/touch/simulate.h"
 #include "tests/hidden_effects/generator/unlisted.h"
 

@@ -7,12 +7,12 @@
 #include <set>
 
 #include "server/base/status.h"
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/effects/all_effects.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "server/model/model.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -5,7 +5,7 @@
 #include <exception>
 #include <stdexcept>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "tests/hidden_effects/generator/program.h"
 
 int main(int argc, char** argv) {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "server/base/file_writer.h"
+#include "server/base/files/file_writer.h"
 #include "server/base/test_folder.h"
-#include "server/session/measurement_set.h"
+#include "server/session/measurements/measurement_set.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "server/geometry/mesh_file.h"
-#include "server/geometry/supershape.h"
+#include "server/geometry/files/mesh_file.h"
+#include "server/geometry/shapes/supershape.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -1,5 +1,5 @@
 """A second simulation of photographs, written from the definitions of the effects (DESIGN, section 5) and of the nominal
-shading (the words of server/image/shading.h) alone. One ray per pixel centre; lens, blurs and turns by OpenCV.
+shading (the words of server/image/scene/shading.h) alone. One ray per pixel centre; lens, blurs and turns by OpenCV.
 """
 import dataclasses
 from typing import Optional

@@ -7,7 +7,7 @@ import pathlib
 
 import numpy as np
 
-# Neighbouring triangles that meet at a sharper angle do not share a normal (server/image/shading.h, in words).
+# Neighbouring triangles that meet at a sharper angle do not share a normal (server/image/scene/shading.h, in words).
 CREASE_DEG = 35.0
 
 

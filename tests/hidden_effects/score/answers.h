@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"

@@ -12,9 +12,9 @@
 #include "server/base/test_paths.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "tests/hidden_effects/generator/rig.h"
+#include "tests/hidden_effects/score/arms/outside_strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 #include "tests/hidden_effects/score/judge.h"
-#include "tests/hidden_effects/score/outside_strengths.h"
-#include "tests/hidden_effects/score/strengths.h"
 #include "tests/hidden_effects/score/table.h"
 
 namespace touchstone::hidden {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "server/diagnosis/diagnose.h"
-#include "server/diagnosis/report/write_report.h"
-#include "tests/hidden_effects/score/arms.h"
+#include "server/diagnosis/report/message/write_report.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 

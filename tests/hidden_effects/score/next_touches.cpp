@@ -9,7 +9,7 @@
 
 #include "server/base/status.h"
 #include "tests/hidden_effects/generator/rig.h"
-#include "tests/hidden_effects/score/strengths.h"
+#include "tests/hidden_effects/score/arms/strengths.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 
 namespace touchstone::hidden {
 

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/score/outside_strengths.h"
+#include "tests/hidden_effects/score/arms/outside_strengths.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <set>
 
 #include "server/effects/all_effects.h"
-#include "tests/hidden_effects/score/test_objects.h"
+#include "tests/hidden_effects/score/arms/test_objects.h"
 #include "tests/hidden_effects/score/verify.h"
 
 namespace touchstone::hidden {

@@ -6,8 +6,8 @@
 
 #include "server/base/test_paths.h"
 #include "server/effects/all_effects.h"
+#include "tests/hidden_effects/score/arms/test_objects.h"
 #include "tests/hidden_effects/score/judge.h"
-#include "tests/hidden_effects/score/test_objects.h"
 
 namespace touchstone::hidden {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 #include "tests/hidden_effects/score/verify.h"
 
 namespace touchstone::hidden {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/hidden_effects/score/arms.h"
+#include "tests/hidden_effects/score/arms/arms.h"
 #include "tests/hidden_effects/score/figures.h"
 #include "tests/hidden_effects/score/judge.h"
 #include "tests/hidden_effects/score/table.h"

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/report/write_report.h"
+#include "server/diagnosis/report/message/write_report.h"
+#include "tests/hidden_effects/score/arms/test_objects.h"
 #include "tests/hidden_effects/score/judge.h"
-#include "tests/hidden_effects/score/test_objects.h"
 
 namespace touchstone::hidden {
 

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstdio>
 
-#include "server/base/thread_pool.h"
+#include "server/base/threads/thread_pool.h"
 #include "server/gateway/arm/ur_arm.h"
 #include "server/gateway/arm/ur_modes.h"
 #include "server/gateway/rig/rig.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/resources.h"
 #include "server/service/gateway/gateway_options.h"
-#include "server/session/command_bytes.h"
+#include "server/session/journal/command_bytes.h"
 #include "tests/physical/endurance/measure.h"
 #include "tests/physical/endurance/stamped_parts.h"
 #include "tests/physical/physical_test.h"

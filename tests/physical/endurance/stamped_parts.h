@@ -7,7 +7,7 @@
 #include "server/gateway/arm/arm.h"
 #include "server/gateway/effector/effector.h"
 #include "server/gateway/timing/change_notifier.h"
-#include "server/session/journal.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone {
 

@@ -15,12 +15,12 @@
 #include <stdexcept>
 #include <thread>
 
-#include "tests/rig/controller/client.h"
-#include "tests/rig/controller/dashboard.h"
-#include "tests/rig/controller/machine.h"
-#include "tests/rig/controller/net.h"
-#include "tests/rig/controller/primary_packets.h"
-#include "tests/rig/controller/realtime_packet.h"
+#include "tests/rig/controller/machine/machine.h"
+#include "tests/rig/controller/network/net.h"
+#include "tests/rig/controller/protocol/client.h"
+#include "tests/rig/controller/protocol/dashboard.h"
+#include "tests/rig/controller/protocol/primary_packets.h"
+#include "tests/rig/controller/protocol/realtime_packet.h"
 
 namespace touchstone::rig {
 namespace {

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/rig/controller/test_client.h"
-#include "tests/rig/controller/unread.h"
+#include "tests/rig/controller/network/unread.h"
+#include "tests/rig/controller/protocol/test_client.h"
 
 namespace touchstone::rig {
 namespace {

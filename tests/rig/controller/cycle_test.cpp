@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/rig/controller/dashboard.h"
-#include "tests/rig/controller/machine.h"
-#include "tests/rig/controller/realtime_packet.h"
-#include "tests/rig/controller/test_client.h"
+#include "tests/rig/controller/machine/machine.h"
+#include "tests/rig/controller/protocol/dashboard.h"
+#include "tests/rig/controller/protocol/realtime_packet.h"
+#include "tests/rig/controller/protocol/test_client.h"
 
 namespace touchstone::rig {
 namespace {

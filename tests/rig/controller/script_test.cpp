@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/rig/controller/machine.h"
-#include "tests/rig/controller/program_reader.h"
+#include "tests/rig/controller/machine/machine.h"
+#include "tests/rig/controller/script/program_reader.h"
 
 namespace touchstone::rig {
 namespace {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "server/image/encode.h"
-#include "tests/rig/controller/unread.h"
+#include "server/image/encoding/encode.h"
+#include "tests/rig/controller/network/unread.h"
 
 namespace touchstone::rig {
 namespace {

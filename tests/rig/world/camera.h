@@ -19,8 +19,8 @@
 
 #include <Eigen/Geometry>
 
-#include "server/geometry/surface.h"
-#include "server/image/renderer.h"
+#include "server/geometry/surface/surface.h"
+#include "server/image/renderers/renderer.h"
 #include "tests/rig/world.h"
 #include "tests/rig/world/camera_light.h"
 #include "tests/rig/world/hidden_camera.h"

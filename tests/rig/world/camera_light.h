@@ -1,4 +1,4 @@
-// The light that single rays bring into the emulated camera, from the words of server/image/shading.h: two point lights
+// The light that single rays bring into the emulated camera, from the words of server/image/scene/shading.h: two point lights
 // that stand on the camera, a white matte surface, no shadows. Double precision and one ray each, so that a lens of any
 // shape sees edges as sharp as they are.
 #pragma once
@@ -8,8 +8,8 @@
 
 #include <Eigen/Geometry>
 
-#include "server/geometry/surface.h"
-#include "server/image/shading_mesh.h"
+#include "server/geometry/surface/surface.h"
+#include "server/image/scene/shading_mesh.h"
 
 namespace touchstone::rig {
 

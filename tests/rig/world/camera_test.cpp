@@ -11,8 +11,8 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "server/geometry/supershape.h"
-#include "tests/rig/controller/net.h"
+#include "server/geometry/shapes/supershape.h"
+#include "tests/rig/controller/network/net.h"
 
 namespace touchstone::rig {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "firmware/core/effector.h"
-#include "tests/rig/controller/unread.h"
+#include "tests/rig/controller/network/unread.h"
 #include "tests/rig/world/oscillator.h"
 #include "tests/rig/world/pins.h"
 #include "tests/rig/world/serial_line.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "server/geometry/supershape.h"
-#include "server/image/renderer.h"
+#include "server/geometry/shapes/supershape.h"
+#include "server/image/renderers/renderer.h"
 #include "tests/rig/world/camera_light.h"
 
 namespace touchstone::rig {

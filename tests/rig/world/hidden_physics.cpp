@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "server/geometry/supershape.h"
+#include "server/geometry/shapes/supershape.h"
 #include "tests/hidden_effects/generator/unlisted.h"
 #include "tests/rig/world/hidden_camera.h"
 

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curves/term_factors.h"
 #include "server/diagnosis/selection/curves/term_scores.h"
-#include "server/effects/formula.h"
+#include "server/effects/formula/formula.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

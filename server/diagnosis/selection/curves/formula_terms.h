@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone::diagnosis::selection {

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone::diagnosis::selection {

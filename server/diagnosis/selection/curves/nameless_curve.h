@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/touches/touch_observation_model.h"
 
 namespace touchstone::diagnosis::selection {

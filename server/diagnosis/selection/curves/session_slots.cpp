@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/engine/laplace_evidence.h"
+#include "server/diagnosis/engine/fit/laplace_evidence.h"
 
 namespace touchstone::diagnosis::selection {
 

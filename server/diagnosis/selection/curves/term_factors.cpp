@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/text.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 
 namespace touchstone::diagnosis::selection {

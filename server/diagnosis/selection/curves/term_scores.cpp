@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 
 namespace touchstone::diagnosis::selection {
 

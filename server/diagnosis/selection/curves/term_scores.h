@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 
 namespace touchstone::diagnosis::selection {
 

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <utility>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
-#include "server/diagnosis/engine/laplace_evidence.h"
+#include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/candidate_course.h"
 #include "server/diagnosis/selection/curves/held_out_curve.h"
 #include "server/diagnosis/selection/curves/session_slots.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -24,7 +24,7 @@ enum class Hypothesis {
   kUnevenScatter,    // the noise differs between parts of the set (uneven_scatter.h)
   kLopsided,         // the noise reaches farther to one side (lopsided_scatter.h)
   kSetAside,         // what the fit set aside is more than a few gross errors (touches_set_aside.h)
-  kTicks,            // some of the times were read in ticks (touches/ticks.h)
+  kTicks,            // some of the times were read in ticks (touches/noise/ticks.h)
   kPlay,    // the object lies elsewhere, or the arm is faster or slower, at every touch (pose_scatter.h)
   kCourse,  // repeats share a course in time (time_structure.h)
   kMisfit,  // a lack of fit, of whatever kind (engine/findings.h)

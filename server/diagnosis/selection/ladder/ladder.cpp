@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/readable_time.h"
 #include "server/base/status.h"
-#include "server/diagnosis/engine/candidate_ranking.h"
+#include "server/base/text/readable_time.h"
+#include "server/diagnosis/engine/competition/candidate_ranking.h"
 #include "server/diagnosis/engine/findings.h"
-#include "server/diagnosis/engine/held_out.h"
+#include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/ladder/climb.h"
 #include "server/diagnosis/selection/ladder/doubts.h"
@@ -25,8 +25,8 @@
 #include "server/diagnosis/selection/session/round_structure.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
-#include "server/diagnosis/touches/noise_sample.h"
-#include "server/diagnosis/touches/ticks.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {

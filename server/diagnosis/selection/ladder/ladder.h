@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/ladder.h"
-#include "server/diagnosis/engine/set_aside.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
+#include "server/diagnosis/engine/search/set_aside.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/selection.h"
 #include "server/uncertainty/posterior.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {

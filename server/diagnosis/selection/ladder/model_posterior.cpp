@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
-#include "server/diagnosis/engine/support_points.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/engine/fit/support_points.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::selection {

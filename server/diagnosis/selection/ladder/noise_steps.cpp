@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"

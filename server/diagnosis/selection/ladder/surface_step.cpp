@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/normal.h"
+#include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/surface/surface_map_fit.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/decompositions.h"
-#include "server/base/distributions.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curve_competition.h"

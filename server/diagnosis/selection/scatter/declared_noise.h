@@ -1,7 +1,7 @@
 // What a model says of the noise, in the terms of the engine.
 #pragma once
 
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::selection {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 
 namespace touchstone::diagnosis::selection {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {

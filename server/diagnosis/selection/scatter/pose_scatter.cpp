@@ -6,7 +6,7 @@
 
 #include <absl/strings/str_format.h>
 
-#include "server/base/decompositions.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
 

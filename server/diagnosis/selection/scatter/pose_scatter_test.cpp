@@ -1,5 +1,5 @@
 #include "server/diagnosis/selection/scatter/pose_scatter.h"
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Touches that a fit set aside as outliers, and what they share: the object, the round, the face, the finger.
 #pragma once
 
-#include "server/diagnosis/engine/set_aside.h"
+#include "server/diagnosis/engine/search/set_aside.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "server/base/units.h"
-#include "server/diagnosis/engine/uneven_parts.h"
+#include "server/diagnosis/engine/competition/uneven_parts.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

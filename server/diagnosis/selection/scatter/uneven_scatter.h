@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
-#include "server/diagnosis/touches/noise_kinds.h"
+#include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/touches/noise/noise_kinds.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 

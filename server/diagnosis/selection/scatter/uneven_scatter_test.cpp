@@ -6,8 +6,8 @@
 #include <cmath>
 #include <functional>
 
-#include "server/base/random.h"
-#include "server/diagnosis/touches/noise_sample.h"
+#include "server/base/numbers/random.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::selection {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
-#include "server/base/distributions.h"
-#include "server/diagnosis/touches/noise_sample.h"
+#include "server/base/numbers/distributions.h"
+#include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::selection {

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/readable_time.h"
+#include "server/base/text/readable_time.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/touches/contrasts.h"
 
 namespace touchstone::diagnosis::selection {

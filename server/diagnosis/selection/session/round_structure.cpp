@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/decompositions.h"
-#include "server/base/distributions.h"
-#include "server/base/random.h"
-#include "server/base/readable_time.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/distributions.h"
+#include "server/base/numbers/random.h"
+#include "server/base/text/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
 

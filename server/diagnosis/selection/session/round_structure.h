@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/touches/observations.h"
 #include "server/diagnosis/touches/prediction.h"
 

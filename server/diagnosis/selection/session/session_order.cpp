@@ -8,7 +8,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include "server/base/distributions.h"
+#include "server/base/numbers/distributions.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

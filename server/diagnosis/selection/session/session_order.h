@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/competition.h"
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

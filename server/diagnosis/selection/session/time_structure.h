@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "server/diagnosis/engine/result.h"
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/touches/observations.h"
 
 namespace touchstone::diagnosis::selection {

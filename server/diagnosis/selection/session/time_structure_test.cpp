@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

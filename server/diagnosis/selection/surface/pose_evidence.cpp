@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/decompositions.h"
-#include "server/effects/surface_departure.h"
+#include "server/base/numbers/decompositions.h"
+#include "server/effects/contact/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis::selection {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/matern.h"
+#include "server/base/numbers/matern.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/diagnosis/engine/support_points.h"
-#include "server/effects/surface_map.h"
+#include "server/diagnosis/engine/fit/support_points.h"
+#include "server/effects/contact/surface_map.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/decompositions.h"
-#include "server/base/readable_time.h"
+#include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
+#include "server/base/text/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/surface/pose_evidence.h"
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "server/diagnosis/engine/fit.h"
+#include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/selection/surface/pose_evidence.h"
 #include "server/diagnosis/selection/workspace.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/base/random.h"
+#include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 

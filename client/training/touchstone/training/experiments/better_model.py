@@ -9,11 +9,12 @@ import numpy as np
 from scipy import stats
 from sklearn import exceptions
 
-from .. import ladder, ladder_figures, ladder_words, plans
+from .. import ladder, plans
 from ..context import Context
 from ..experiment import Experiment
 from ..features import FeatureSets, dealt_rows, of_rows
-from ..ladder_words import Climb
+from ..ladder import figures as ladder_figures, words as ladder_words
+from ..ladder.words import Climb
 from ..prediction_powered import bootstrap_gain, powered_mean, simulated_per_measured
 from ..recognisers import SEEDS, TEN, Trained
 from ..result import Result

@@ -14,8 +14,7 @@ import numpy as np
 from touchstone.tabular import Tabular
 from touchstone.whole_file import whole_file
 
-from .. import ladder_words
-from ..ladder import Rung
+from ..ladder import Rung, words as ladder_words
 from ..result import Estimate, Table
 from .intervals import Exchange
 

@@ -1,7 +1,0 @@
-#include "server/base/version.h"
-
-namespace touchstone {
-
-const char* const kVersion = TOUCHSTONE_VERSION;
-
-}  // namespace touchstone

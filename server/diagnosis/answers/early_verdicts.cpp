@@ -1,0 +1,88 @@
+#include "server/diagnosis/answers/early_verdicts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/report/kinds/from_touches.h"
+#include "server/diagnosis/report/words/summary.h"
+
+namespace touchstone::diagnosis {
+namespace {
+
+// Degrees of freedom that a verdict needs, one per contrast (fingers - 1 of each touch). The largest effect of the
+// catalogue, object_pose, takes six values and the noise one. What is left must show a misfit that doubles the noise's
+// variance: with 24 degrees F is above 1.8 in 1 of 100 cases, with 8 above 2.5, and a fit of seven values to twelve
+// numbers finds an effect in anything.
+constexpr int kFittedValues = 7;
+constexpr int kLeft = 24;
+// Repeats of one touch say nothing of the model: as many values must come from different touches.
+constexpr int kMinPoses = 4;
+
+report::Diagnosis ReportOf(const selection::Workspace& workspace) {
+  report::Diagnosis diagnosis = BeginDiagnosis(workspace);
+  AddHowWrong(workspace, touches::Residuals(*workspace.observations, workspace.nominal), &diagnosis);
+  return diagnosis;
+}
+
+}  // namespace
+
+report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
+                                  const std::vector<engine::DataProblem>& problems) {
+  report::Diagnosis diagnosis;
+  const auto workspace = selection::MakeWorkspace(input, context);
+  if (workspace.ok()) {
+    diagnosis = ReportOf(**workspace);
+  } else {
+    // The mistake makes the file contradict the meshes or the units, which would be an error without it.
+    diagnosis.model_name = input.model->name;
+    diagnosis.model_hash = input.model->Hash();
+    const auto o = touches::MakeObservations(input);
+    diagnosis.data = {o.ok() ? DataOf(*o, input) : report::DataReport()};
+    diagnosis.data[0].session = input.set->origin;
+    const double before_s = problems.empty() ? NAN : problems[0].error_before;
+    if (before_s > 0)
+      diagnosis.data[0].initial = diagnosis.data[0].final =
+          report::InMicroseconds(report::Quality{before_s, before_s, 0});
+  }
+  diagnosis.verdict = engine::Verdict::kCheckData;
+  for (const engine::DataProblem& problem : problems)
+    diagnosis.data_problems.push_back(report::InMicroseconds(problem));
+  diagnosis.summary = report::Summarize(diagnosis);
+  return diagnosis;
+}
+
+int TouchesNeeded(const touches::Observations& o) {
+  std::set<int> poses;
+  int used = 0, contrasts = 0;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    ++used;
+    poses.insert(o.pose[k]);
+    int reporting = 0;
+    for (int i = 0; i < o.fingers; ++i)
+      reporting += !std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
+    contrasts += reporting - 1;
+  }
+  const int needed = kFittedValues + kLeft;
+  if (contrasts >= needed && static_cast<int>(poses.size()) >= kMinPoses) return 0;
+  // Fingers that stay silent make more touches necessary.
+  const double per_touch = used > 0 ? static_cast<double>(contrasts) / used : o.fingers - 1;
+  const int touches = static_cast<int>(std::ceil(needed / std::max(per_touch, 1.0)));
+  return static_cast<int>(poses.size()) >= kMinPoses
+             ? touches
+             : std::max(touches, used + kMinPoses - static_cast<int>(poses.size()));
+}
+
+report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int touches_needed) {
+  report::Diagnosis diagnosis = ReportOf(workspace);
+  diagnosis.verdict = engine::Verdict::kTooLittleData;
+  diagnosis.data[0].needed = touches_needed;
+  for (std::string& warning : report::DataWarnings(diagnosis.data[0]))
+    diagnosis.warnings.push_back(std::move(warning));
+  diagnosis.summary = report::Summarize(diagnosis);
+  return diagnosis;
+}
+
+}  // namespace touchstone::diagnosis

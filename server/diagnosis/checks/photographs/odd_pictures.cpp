@@ -1,0 +1,153 @@
+#include "server/diagnosis/checks/photographs/odd_pictures.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+namespace touchstone::diagnosis::checks {
+namespace {
+
+using Mirror = session::ImageSetFix::Mirror;
+
+constexpr int kMinAll = 8;            // pictures that say what is odd
+constexpr double kMaxOddShare = 0.1;  // of the pictures; two may be odd in any case
+constexpr double kMaxMedian = 0.1;    // left of the others: the model explains them
+constexpr double kMinOddLeft = 0.12;  // left of an odd picture, at least,
+constexpr double kMinOddRatio = 8;    // ... and over the median
+constexpr double kFixedRatio = 0.3;   // left by a fix, over what was left
+constexpr double kLikeOthers = 3;     // ... or over the median
+
+class OddSearch {
+ public:
+  OddSearch(const PhotoTrial& trial, const session::ImageSet& set) : trial_(trial), set_(set) {}
+
+  std::vector<OddPictures> Find() {
+    std::vector<int> all(trial_.size());
+    std::iota(all.begin(), all.end(), 0);
+    const std::vector<TrialPicture> pictures = trial_.RunOn(all, {}, nullptr);
+    if (pictures.size() < kMinAll) return {};
+    std::vector<double> left;
+    for (const TrialPicture& picture : pictures) left.push_back(picture.left);
+    std::nth_element(left.begin(), left.begin() + static_cast<long>(left.size() / 2), left.end());
+    median_ = left[left.size() / 2];
+    if (median_ > kMaxMedian) return {};
+    for (const TrialPicture& picture : pictures)
+      if (picture.left > std::max(kMinOddLeft, kMinOddRatio * median_)) odd_.push_back(picture);
+    if (odd_.empty() ||
+        odd_.size() > std::max<size_t>(2, static_cast<size_t>(kMaxOddShare * pictures.size())))
+      return {};
+    TryExchanges();
+    TryAlone();
+    std::vector<TrialPicture> unknown;
+    for (const TrialPicture& picture : odd_)
+      if (fixed_.count(picture.row) == 0) unknown.push_back(picture);
+    if (!unknown.empty()) AddUnknown(unknown);
+    return std::move(found_);
+  }
+
+ private:
+  uint64_t ImageOf(const TrialPicture& picture) const { return set_.photographs[picture.row].image; }
+
+  bool IsFixed(double before, double after) const {
+    return after < std::max(kLikeOthers * median_, kFixedRatio * before) && after < before;
+  }
+
+  // The best exchange first, each picture once.
+  void TryExchanges() {
+    struct Pair {
+      size_t one, other;
+      double after;
+    };
+    std::vector<Pair> pairs;
+    for (size_t a = 0; a < odd_.size(); ++a)
+      for (size_t b = a + 1; b < odd_.size(); ++b) {
+        session::ImageSetFix fix;
+        fix.exchange = {ImageOf(odd_[a]), ImageOf(odd_[b])};
+        const std::vector<TrialPicture> after = trial_.RunOn({odd_[a].row, odd_[b].row}, fix, nullptr);
+        if (after.size() == 2 && IsFixed(odd_[a].left, after[0].left) && IsFixed(odd_[b].left, after[1].left))
+          pairs.push_back({a, b, 0.5 * (after[0].left + after[1].left)});
+      }
+    std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.after < b.after; });
+    for (const Pair& pair : pairs) {
+      const TrialPicture &one = odd_[pair.one], &other = odd_[pair.other];
+      if (fixed_.count(one.row) > 0 || fixed_.count(other.row) > 0) continue;
+      fixed_.insert({one.row, other.row});
+      OddPictures odd{{}, 0.5 * (one.left + other.left), pair.after};
+      odd.mistake.kind = ProblemKind::kExchanged;
+      odd.mistake.detail = absl::StrCat("image ", ImageOf(one), " <-> image ", ImageOf(other));
+      odd.mistake.words =
+          absl::StrCat("images ", ImageOf(one), " and ", ImageOf(other), " stand in each other's row");
+      odd.mistake.fix.exchange = {ImageOf(one), ImageOf(other)};
+      found_.push_back(std::move(odd));
+    }
+  }
+
+  // Each picture by itself: turned, mirrored, its camera the other way round.
+  void TryAlone() {
+    std::vector<CandidateMistake> kinds;
+    const auto add = [&](ProblemKind kind, const char* words) -> session::ImageSetFix& {
+      kinds.push_back({kind, "", words, {}, nullptr, "", 0});
+      return kinds.back().fix;
+    };
+    add(ProblemKind::kUpAxis, "has its camera's up reversed").reverse_up = true;
+    for (const int turn_deg : {180, 90, 270}) {
+      if (turn_deg != 180 && set_.camera.width_px != set_.camera.height_px) continue;
+      add(ProblemKind::kRotated, "is turned").rotate_deg = turn_deg;
+    }
+    add(ProblemKind::kMirrored, "is mirrored").mirror = Mirror::kLeftRight;
+    add(ProblemKind::kMirrored, "is mirrored").mirror = Mirror::kUpDown;
+    for (const TrialPicture& picture : odd_) {
+      if (fixed_.count(picture.row) > 0) continue;
+      OddPictures best{{}, picture.left, picture.left};
+      for (const CandidateMistake& kind : kinds) {
+        CandidateMistake mistake = kind;
+        mistake.fix.images = {{ImageOf(picture), ImageOf(picture)}};
+        const std::vector<TrialPicture> after = trial_.RunOn({picture.row}, mistake.fix, nullptr);
+        if (after.size() != 1 || !IsFixed(picture.left, after[0].left) || after[0].left >= best.after)
+          continue;
+        mistake.detail = absl::StrCat("image ", ImageOf(picture));
+        mistake.words = absl::StrCat("image ", ImageOf(picture), " ", kind.words);
+        best.after = after[0].left;
+        best.mistake = std::move(mistake);
+      }
+      if (best.mistake.words.empty()) continue;
+      fixed_.insert(picture.row);
+      found_.push_back(std::move(best));
+    }
+  }
+
+  void AddUnknown(const std::vector<TrialPicture>& unknown) {
+    OddPictures odd{{}, 0, median_};
+    for (const TrialPicture& picture : unknown) {
+      odd.mistake.fix.drop.push_back(ImageOf(picture));
+      odd.before += picture.left / static_cast<double>(unknown.size());
+    }
+    const std::string images =
+        absl::StrCat(unknown.size() == 1 ? "image " : "images ", absl::StrJoin(odd.mistake.fix.drop, ", "));
+    odd.mistake.kind = ProblemKind::kOddPicture;
+    odd.mistake.detail = images;
+    odd.mistake.words = absl::StrCat(
+        images, unknown.size() == 1 ? " shows" : " show",
+        " something else than images.csv says, or something lies before the camera (a hand, a cable)");
+    found_.push_back(std::move(odd));
+  }
+
+  const PhotoTrial& trial_;
+  const session::ImageSet& set_;
+  double median_ = 0;
+  std::vector<TrialPicture> odd_;
+  std::set<int> fixed_;  // rows
+  std::vector<OddPictures> found_;
+};
+
+}  // namespace
+
+std::vector<OddPictures> FindOddPictures(const PhotoTrial& trial, const session::ImageSet& set) {
+  return OddSearch(trial, set).Find();
+}
+
+}  // namespace touchstone::diagnosis::checks

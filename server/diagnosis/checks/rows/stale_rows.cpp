@@ -1,0 +1,35 @@
+#include "server/diagnosis/checks/rows/stale_rows.h"
+
+#include "server/session/measurements/measurement_fix.h"
+
+namespace touchstone::diagnosis::checks {
+namespace {
+
+constexpr int kMinStale = 3;
+constexpr double kStaleOverChance = 10;
+constexpr int kFirstLag = 3, kLastLag = 30;  // rows so far apart are alike by chance alone
+
+// One pose in a row may well give the same times again.
+bool SamePose(const session::MeasurementSet& set, int a, int b) {
+  return set.object[a] == set.object[b] && set.target_m[a] == set.target_m[b] &&
+         set.approach[a] == set.approach[b] && set.lateral[a] == set.lateral[b];
+}
+
+}  // namespace
+
+StaleRows FindStaleRows(const session::MeasurementSet& set) {
+  StaleRows found;
+  int alike = 0;
+  for (int row = 0; row < set.size(); ++row) {
+    if (session::RepeatsRow(set, row, 1) && !SamePose(set, row, row - 1)) {
+      ++found.rows;
+      if (found.example < 0) found.example = row;
+    }
+    for (int lag = kFirstLag; lag <= kLastLag; ++lag)
+      if (row >= lag && !SamePose(set, row, row - lag)) alike += session::RepeatsRow(set, row, lag);
+  }
+  found.expected = static_cast<double>(alike) / (kLastLag - kFirstLag + 1);
+  return found.rows > kMinStale + kStaleOverChance * found.expected ? found : StaleRows{};
+}
+
+}  // namespace touchstone::diagnosis::checks

@@ -1,0 +1,32 @@
+// When parts of a set (objects, stretches of the session, grey levels) scatter by amounts that clearly differ: one rule for
+// every kind of measurement.
+#pragma once
+
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "server/base/numbers/distributions.h"
+#include "server/diagnosis/engine/competition/result.h"
+
+namespace touchstone::diagnosis::engine {
+
+inline constexpr double kUnevenNats = 10;
+inline constexpr double kUnevenRatio = 4.0 / 3;   // of the largest scale over the smallest
+inline constexpr double kAlikeUnevenShare = 0.6;  // of the gain, of what says nearly the same
+
+// Gains of log likelihood below this are what `parts` scales among `count` measurements gain by chance.
+inline double EnoughToBeUneven(double parts, double count) {
+  return kUnevenNats + 0.5 * (parts - 1) * std::log(count);
+}
+
+// `gain_nats`: of log likelihood, of a scale for each of `parts` parts over one for all. Nothing where one scale says the
+// same. The p-value is of this way to part the set alone.
+inline std::optional<CovariateTest> TestUneven(const std::string& covariate, double gain_nats, double parts,
+                                               double count, double smallest_scale, double largest_scale) {
+  const double enough = EnoughToBeUneven(parts, count);
+  if (gain_nats < enough || largest_scale < kUnevenRatio * smallest_scale) return std::nullopt;
+  return CovariateTest{covariate, ChiSquaredTail(2 * gain_nats, parts - 1), gain_nats - enough + kUnevenNats};
+}
+
+}  // namespace touchstone::diagnosis::engine

@@ -1,0 +1,125 @@
+#include "server/diagnosis/engine/ladder/ladder.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/status.h"
+#include "server/diagnosis/engine/ladder/where_in_words.h"
+
+namespace touchstone::diagnosis::engine {
+namespace {
+
+constexpr double kZeroErrors = 2;       // standard errors of a value that may be zero
+constexpr double kZero = 1e-6;          // ... or this share of the typical size
+constexpr double kDoubted = 0.5;        // probability of a step that explains nothing of what is left
+constexpr double kMaxBesideRest = 0.9;  // ... of one that explains all but a trace
+
+bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& estimates) {
+  for (const ParameterEstimate& e : estimates)
+    for (const model::ParameterInfo& parameter : effect.parameters)
+      if (parameter.name == e.name &&
+          (parameter.reciprocal || std::abs(e.value - parameter.neutral) >
+                                       std::max(kZeroErrors * e.std_error, kZero * parameter.typical)))
+        return false;
+  return true;
+}
+
+}  // namespace
+
+LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from) {
+  const model::EffectInstance& instance = values.model.base().effects[from.effect];
+  LadderStep step;
+  step.effect = NameOf(*instance.effect);
+  step.scope = instance.per_object ? EffectScope::kObject : EffectScope::kRig;
+  AddTexts(*instance.effect, &step);
+  step.probability = from.probability;
+  step.gain_nats = from.gain_nats;
+  step.parameters = values.model.Describe(from.effect, values.point, covariance);
+  if (const std::string where = WhereInWords(values, from); !where.empty()) AddWords(where, &step);
+  if (!from.words.empty()) AddWords(from.words, &step);
+  std::vector<std::string> names = {step.effect};
+  for (const CompetingEffect& other : from.competing)
+    if (other.equivalent && std::find(names.begin(), names.end(), other.name) == names.end())
+      names.push_back(other.name);
+  step.equivalent.assign(names.begin() + 1, names.end());
+  for (const CompetingEffect& other : from.competing)
+    if (other.stopped && other.per_object == instance.per_object &&
+        other.object == values.model.OnlyObject(from.effect))
+      AddWords(other.name + " would do as well with a value beyond its bound.", &step);
+  if (!step.equivalent.empty()) step.discriminating_measurement = DiscriminatingMeasurement(names);
+  return step;
+}
+
+void AddConfounded(const LadderStep& step, std::vector<ConfoundedEffects>* confounded) {
+  if (step.equivalent.empty()) return;
+  std::vector<std::string> names = {step.effect};
+  names.insert(names.end(), step.equivalent.begin(), step.equivalent.end());
+  confounded->push_back({std::move(names), step.discriminating_measurement});
+}
+
+absl::StatusOr<GivenEffects> DescribeGivenEffects(const Experiment& experiment, const Fit& selected,
+                                                  const Fit& values, const Eigen::MatrixXd& covariance,
+                                                  const model::Model& given,
+                                                  const std::vector<std::string>& objects) {
+  const Parameterization initial(given, objects);
+  GivenEffects found;
+  for (int index = static_cast<int>(given.effects.size()) - 1; index >= 0; --index) {
+    if (!values.model.IsFree(index)) continue;
+    const model::Effect& effect = *given.effects[index].effect;
+    RefittedEffect refit = {NameOf(effect), values.model.Describe(index, values.point, covariance)};
+    if (IsZero(effect, refit.parameters)) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, FitModel(experiment, selected.model.Without(index)));
+      if (without.log_evidence >= selected.log_evidence) {
+        found.superfluous.push_back(index);
+        found.superfluous_names.push_back(refit.effect);
+        continue;
+      }
+    }
+    const std::vector<ParameterEstimate> old = initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
+    for (size_t j = 0; j < refit.parameters.size() && j < old.size(); ++j)
+      refit.parameters[j].before = old[j].value;
+    found.refitted.insert(found.refitted.begin(), std::move(refit));
+  }
+  return found;
+}
+
+double ExplainedShare(double rmse_before, double rmse_after, double noise) {
+  const double before = rmse_before * rmse_before - noise * noise;
+  const double after = rmse_after * rmse_after - noise * noise;
+  return before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+}
+
+double MostBesideRest(double explained_share, bool doubted) {
+  return doubted ? kDoubted : kDoubted + (kMaxBesideRest - kDoubted) * explained_share;
+}
+
+void DoubtBesideRest(double most, std::vector<LadderStep>* steps, std::vector<RankedCandidate>* candidates) {
+  for (LadderStep& step : *steps) {
+    step.probability = std::min(step.probability, most);
+    AddWords("Beside it a rest remains unexplained: it may stand in for something else.", &step);
+  }
+  for (RankedCandidate& candidate : *candidates)
+    candidate.probability = std::min(candidate.probability, most);
+}
+
+void AddWords(const std::string& words, LadderStep* step) {
+  absl::StrAppend(&step->words, step->words.empty() ? "" : " ", words);
+}
+
+void AddTexts(const model::Effect& effect, LadderStep* step) {
+  step->meaning = effect.meaning;
+  step->check_on_rig = effect.check_on_rig;
+  step->remedy = effect.remedy;
+}
+
+std::string EffectYaml(model::Model model, model::EffectInstance instance) {
+  model.effects = {std::move(instance)};
+  const std::string text = model::FormatModel(model);
+  const size_t at = text.find("effects:");
+  const size_t line = at == std::string::npos ? std::string::npos : text.find('\n', at);
+  return line == std::string::npos ? text : text.substr(line + 1);
+}
+
+}  // namespace touchstone::diagnosis::engine

@@ -1,0 +1,56 @@
+#include "server/diagnosis/images/pixels/image_field.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr int kMaxHalfWaves = 6;  // across and down together
+constexpr double kTypicalGrey = 5, kMaxGrey = 200;
+
+}  // namespace
+
+std::shared_ptr<const model::Effect> ImageFieldEffect() {
+  static const std::shared_ptr<const model::Effect> effect = [] {
+    auto field = std::make_shared<model::Effect>();
+    field->name = kImageFieldName;
+    field->stage = model::Stage::kImageSensor;
+    field->meaning = "Something that is the same in every picture and smooth across it.";
+    for (int i = 0; i < kImageFieldSize; ++i) {
+      model::ParameterInfo parameter;
+      parameter.name = absl::StrCat("wave", i, "_grey");
+      parameter.unit = Unit::kGreyLevel;
+      parameter.lower = -kMaxGrey;
+      parameter.upper = kMaxGrey;
+      parameter.typical = kTypicalGrey;
+      field->parameters.push_back(parameter);
+    }
+    field->apply_to_photo = [](absl::Span<const double>, effects::PhotoSettings&) {};
+    return field;
+  }();
+  return effect;
+}
+
+Eigen::MatrixXf ImageFieldFunctions(int width, int height) {
+  // Waves of one direction, a column each.
+  const auto waves_along = [](int pixels) {
+    Eigen::MatrixXf waves(pixels, kMaxHalfWaves + 1);
+    for (int k = 0; k <= kMaxHalfWaves; ++k)
+      for (int x = 0; x < pixels; ++x)
+        waves(x, k) = static_cast<float>(std::cos(M_PI * k * (x + 0.5) / pixels));
+    return waves;
+  };
+  const Eigen::MatrixXf across_waves = waves_along(width), down_waves = waves_along(height);
+  Eigen::MatrixXf functions(static_cast<Eigen::Index>(width) * height, kImageFieldSize);
+  int column = 0;
+  for (int waves = 0; waves <= kMaxHalfWaves; ++waves)
+    for (int across = 0; across <= waves; ++across, ++column)
+      for (int y = 0; y < height; ++y)
+        functions.col(column).segment(static_cast<Eigen::Index>(y) * width, width) =
+            down_waves(y, waves - across) * across_waves.col(across);
+  return functions;
+}
+
+}  // namespace touchstone::diagnosis::images

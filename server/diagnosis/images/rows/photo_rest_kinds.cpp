@@ -1,0 +1,290 @@
+#include "server/diagnosis/images/rows/photo_rest_kinds.h"
+
+#include <Eigen/Cholesky>
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace touchstone::diagnosis::images {
+namespace {
+
+constexpr int kBlockPx = 16;   // side of a block of a picture
+constexpr int kKindFolds = 5;  // of the poses
+constexpr int kKindMapSide = 14,
+              kKindPlaceSide = 6;      // cells of a picture and of an object's box, along a side
+constexpr double kMaxFewShare = 0.1;   // of the pictures, that are a few
+constexpr double kMinFewShare = 0.5;   // of the excess, that they hold
+constexpr double kKindShrinkage = 20;  // pixels' worth of a prior at no change, of a cell
+constexpr int kPlaceColumns = 4;       // right, down, and each growing from row to row
+constexpr double kShear = 0.5;         // of a displacement, that grows from row to row: a shutter
+
+// Sums of a least-squares fit of a few columns to residuals.
+template <int kColumns>
+struct KindSums {
+  Eigen::Matrix<double, kColumns, kColumns> squares = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, kColumns, 1> cross = Eigen::Matrix<double, kColumns, 1>::Zero();
+
+  void Add(const Eigen::Matrix<double, kColumns, 1>& column, double residual) {
+    squares += column * column.transpose();
+    cross += column * residual;
+  }
+  void Add(const KindSums& other) { squares += other.squares, cross += other.cross; }
+  void Remove(const KindSums& other) { squares -= other.squares, cross -= other.cross; }
+  Eigen::Matrix<double, kColumns, 1> Solve() const {
+    auto ridge = squares;
+    ridge.diagonal().array() += 1e-9 * squares.trace() + 1e-12;
+    return ridge.ldlt().solve(cross);
+  }
+  // Squares that these values take.
+  double Taken(const Eigen::Matrix<double, kColumns, 1>& values) const {
+    return 2 * values.dot(cross) - values.dot(squares * values);
+  }
+};
+
+// Of one cell: light that is added, and a share of the light.
+struct Cells {
+  std::vector<double> count, sum, grey_squares, grey_cross;
+  explicit Cells(size_t cells) : count(cells), sum(cells), grey_squares(cells), grey_cross(cells) {}
+  void Add(size_t cell, double grey, double residual) {
+    count[cell] += 1, sum[cell] += residual;
+    grey_squares[cell] += grey * grey, grey_cross[cell] += grey * residual;
+  }
+};
+
+// What one picture says.
+struct PictureSums {
+  std::array<KindSums<1>, 2> light;              // by half of the blocks
+  std::array<KindSums<kPlaceColumns>, 2> place;  // the same
+  KindSums<1> contours;
+  Cells in_picture{kKindMapSide * kKindMapSide}, on_object{kKindPlaceSide * kKindPlaceSide * kKindPlaceSide};
+  double squares = 0, noise = 0;  // the second: expected of noise alone
+
+  double Excess() const { return std::max(squares - noise, 0.0); }
+};
+
+// What the cells of other folds take from each fold, added light or a share of it, whichever is better.
+double TakenByCells(const std::vector<const Cells*>& pictures, const std::vector<int>& fold) {
+  if (pictures.empty()) return 0;
+  double added = 0, shared = 0;
+  for (size_t cell = 0; cell < pictures[0]->count.size(); ++cell) {
+    std::array<double, kKindFolds> count{}, sum{}, squares{}, cross{};
+    for (size_t k = 0; k < pictures.size(); ++k) {
+      count[fold[k]] += pictures[k]->count[cell], sum[fold[k]] += pictures[k]->sum[cell];
+      squares[fold[k]] += pictures[k]->grey_squares[cell], cross[fold[k]] += pictures[k]->grey_cross[cell];
+    }
+    const auto total = [](const auto& of) { return std::accumulate(of.begin(), of.end(), 0.0); };
+    const double mean_square = total(squares) / std::max(total(count), 1.0);
+    for (int f = 0; f < kKindFolds; ++f) {
+      const double value = (total(sum) - sum[f]) / (total(count) - count[f] + kKindShrinkage);
+      added += 2 * value * sum[f] - value * value * count[f];
+      const double factor =
+          (total(cross) - cross[f]) / (total(squares) - squares[f] + kKindShrinkage * mean_square + 1e-9);
+      shared += 2 * factor * cross[f] - factor * factor * squares[f];
+    }
+  }
+  return std::max(added, shared);
+}
+
+class RestKinds {
+ public:
+  RestKinds(const Photographs& photographs, const std::vector<image::Photo>& expected, ThreadPool* pool)
+      : p_(photographs), expected_(expected), sums_(photographs.size()) {
+    ParallelFor(pool, p_.size(), 1, [&](int begin, int end) {
+      for (int k = begin; k < end; ++k) Sum(k);
+    });
+    for (int k = 0; k < p_.size(); ++k) {
+      excess_ += sums_[k].Excess();
+      fold_.push_back(p_.pose[k] % kKindFolds);
+    }
+  }
+
+  std::vector<KindOfRest> Find() const {
+    std::vector<KindOfRest> kinds;
+    if (!(excess_ > 0)) return kinds;
+    for (const KindOfRest& kind : {Few(), Light(), Place(), InPicture(), OnObjects(), Contours()})
+      if (kind.share >= kMinKindShare) kinds.push_back(kind);
+    std::stable_sort(kinds.begin(), kinds.end(),
+                     [](const auto& a, const auto& b) { return a.share > b.share; });
+    return kinds;
+  }
+
+ private:
+  void Sum(int k) {
+    PictureSums& sums = sums_[k];
+    const image::Photo& photo = expected_[k];
+    const std::vector<float>& grey = photo.grey;
+    const int width = p_.width(), height = p_.height();
+    const geometry::Bounds& bounds = p_.surfaces[p_.object[k]]->bounds();
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const size_t at = static_cast<size_t>(y) * width + x;
+        const double expected = grey[at], residual = p_.measured_grey[k][at] - expected;
+        sums.squares += residual * residual;
+        sums.noise += p_.record->Variance(expected);
+        const auto near = [&](int column, int row) -> double {
+          return grey[static_cast<size_t>(std::clamp(row, 0, height - 1)) * width +
+                      std::clamp(column, 0, width - 1)];
+        };
+        const int half = (x / kBlockPx + y / kBlockPx) % 2;
+        sums.light[half].Add(Eigen::Matrix<double, 1, 1>(expected), residual);
+        const double right = 0.5 * (near(x - 1, y) - near(x + 1, y)),
+                     down = 0.5 * (near(x, y - 1) - near(x, y + 1)), v = 2 * (y + 0.5) / height - 1;
+        if (right != 0 || down != 0)
+          sums.place[half].Add(Eigen::Vector4d(right, down, right * v, down * v), residual);
+        const double bend = near(x - 1, y) + near(x + 1, y) + near(x, y - 1) + near(x, y + 1) - 4 * expected;
+        if (bend != 0) sums.contours.Add(Eigen::Matrix<double, 1, 1>(bend), residual);
+        sums.in_picture.Add(
+            static_cast<size_t>(y * kKindMapSide / height * kKindMapSide + x * kKindMapSide / width),
+            expected, residual);
+        if (photo.mask[at] == 0) continue;
+        size_t place = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double extent = std::max(bounds.max_m[axis] - bounds.min_m[axis], 1e-9);
+          const double share = (photo.point_m[at][axis] - bounds.min_m[axis]) / extent;
+          place = place * kKindPlaceSide +
+                  std::clamp(static_cast<int>(share * kKindPlaceSide), 0, kKindPlaceSide - 1);
+        }
+        sums.on_object.Add(place, expected, residual);
+      }
+  }
+
+  double Share(double taken) const { return std::clamp(taken / excess_, 0.0, 1.0); }
+
+  // A few pictures that hold most of what is left.
+  KindOfRest Few() const {
+    std::vector<int> order(p_.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return sums_[a].Excess() > sums_[b].Excess(); });
+    const size_t most = std::max<size_t>(1, static_cast<size_t>(kMaxFewShare * p_.size()));
+    double held = 0;
+    std::vector<uint64_t> images;
+    for (size_t n = 0; n < std::min(most, order.size()) && held < kMinFewShare * excess_; ++n) {
+      held += sums_[order[n]].Excess();
+      images.push_back(p_.set->photographs[p_.row[order[n]]].image);
+    }
+    std::sort(images.begin(), images.end());
+    const double share = Share(held);
+    const bool one = images.size() == 1;
+    return {RestKind::kFewPictures, share < kMinFewShare ? 0 : share,
+            absl::StrFormat("%.0f %% of it lies in %s %s of %d: look at %s for something that covers the "
+                            "object, or for another object or pose than images.csv says.",
+                            100 * share, one ? "image" : "images", absl::StrJoin(images, ", "), p_.size(),
+                            one ? "it" : "them")};
+  }
+
+  KindOfRest Light() const {
+    double taken = 0, squares = 0;
+    for (const PictureSums& sums : sums_) {
+      for (int half = 0; half < 2; ++half) taken += sums.light[half].Taken(sums.light[1 - half].Solve());
+      KindSums<1> both = sums.light[0];
+      both.Add(sums.light[1]);
+      squares += std::pow(both.Solve()[0], 2);
+    }
+    const double share = Share(taken);
+    return {RestKind::kLightOfPicture, share,
+            absl::StrFormat("It differs from picture to picture: a brightness of each picture's own (%.2g %% "
+                            "root mean square) takes %.0f %% of it. The lamp flickers, or the camera chooses "
+                            "its exposure. Fix exposure and gain by hand, and photograph a grey card twice.",
+                            100 * std::sqrt(squares / p_.size()), 100 * share)};
+  }
+
+  KindOfRest Place() const {
+    double taken = 0, even = 0, growing = 0;
+    for (const PictureSums& sums : sums_) {
+      for (int half = 0; half < 2; ++half) taken += sums.place[half].Taken(sums.place[1 - half].Solve());
+      KindSums<kPlaceColumns> both = sums.place[0];
+      both.Add(sums.place[1]);
+      const Eigen::Vector4d moved = both.Solve();
+      even += moved.head<2>().squaredNorm(), growing += moved.tail<2>().squaredNorm();
+    }
+    const double share = Share(taken), even_px = std::sqrt(even / p_.size()),
+                 growing_px = 2 * std::sqrt(growing / p_.size());
+    const bool shutter = growing_px > kShear * even_px;
+    return {
+        RestKind::kPlaceOfPicture, share,
+        absl::StrCat(
+            absl::StrFormat(
+                "It differs from picture to picture: a displacement of each picture's own "
+                "(%.2g px%s) takes %.0f %% of it. ",
+                even_px,
+                shutter ? absl::StrFormat(", and %.2g px from the top row to the bottom one", growing_px)
+                        : "",
+                100 * share),
+            shutter ? "The camera moves while its rows are read (rolling shutter). Let the arm stand still "
+                      "before each picture."
+                    : "Poses are off by an amount of their own, or the camera moves. Photograph one pose "
+                      "several times, coming from other sides.")};
+  }
+
+  KindOfRest InPicture() const {
+    std::vector<const Cells*> pictures;
+    for (const PictureSums& sums : sums_) pictures.push_back(&sums.in_picture);
+    return {RestKind::kInPicture, Share(TakenByCells(pictures, fold_)),
+            "Grey levels differ at the same places of every picture: dirt on the lens, a reflection, stray "
+            "light. Photograph a plain white sheet."};
+  }
+
+  KindOfRest OnObjects() const {
+    double taken = 0;
+    for (int object = 0; object < static_cast<int>(p_.objects.size()); ++object) {
+      std::vector<const Cells*> pictures;
+      std::vector<int> fold;
+      for (int k = 0; k < p_.size(); ++k) {
+        if (p_.object[k] != object) continue;
+        pictures.push_back(&sums_[k].on_object);
+        fold.push_back(fold_[k]);
+      }
+      taken += TakenByCells(pictures, fold);
+    }
+    return {RestKind::kOnObjects, Share(taken),
+            "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
+            "dirt, or a shape that departs from its mesh."};
+  }
+
+  KindOfRest Contours() const {
+    KindSums<1> all;
+    for (const PictureSums& sums : sums_) all.Add(sums.contours);
+    double taken = 0;
+    for (int f = 0; f < kKindFolds; ++f) {
+      KindSums<1> others = all, own;
+      for (int k = 0; k < p_.size(); ++k)
+        if (fold_[k] == f) own.Add(sums_[k].contours);
+      others.Remove(own);
+      taken += own.Taken(others.Solve());
+    }
+    const bool sharper = all.Solve()[0] < 0;
+    return {RestKind::kContours, Share(taken),
+            sharper ? "Contours are sharper than light can make them, with a bright and a dark line along "
+                      "them: the camera sharpens its pictures. Switch sharpening off."
+                    : "Contours are softer than expected in every picture: focus, motion, or a picture that "
+                      "was made smaller or compressed. Photograph a sharp edge."};
+  }
+
+  const Photographs& p_;
+  const std::vector<image::Photo>& expected_;
+  std::vector<PictureSums> sums_;
+  std::vector<int> fold_;
+  double excess_ = 0;  // squares
+};
+
+}  // namespace
+
+std::vector<KindOfRest> KindsOfRest(const Photographs& photographs, const std::vector<image::Photo>& expected,
+                                    ThreadPool* pool) {
+  return RestKinds(photographs, expected, pool).Find();
+}
+
+double ShareOf(RestKind kind, const std::vector<KindOfRest>& kinds) {
+  for (const KindOfRest& one : kinds)
+    if (one.kind == kind) return one.share;
+  return 0;
+}
+
+}  // namespace touchstone::diagnosis::images

@@ -1,0 +1,62 @@
+#include "server/diagnosis/residuals/touches/finger_scatter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "server/diagnosis/residuals/slices/covariates.h"
+
+namespace touchstone::diagnosis::residuals {
+namespace {
+
+constexpr double kMinRelativeDifference = 1.0 / 6;
+constexpr double kMaxChance = 1e-3;
+constexpr int kMinPosesCompared = 20;  // below it a mean of squares is no normal variable
+
+// Sums over the touches in which all fingers reported.
+struct ScatterSums {
+  double touches = 0, own = 0, others = 0;  // squares, s^2, per degree of freedom
+  std::map<int, double> apart;              // by pose
+};
+
+ScatterSums SumSquares(const touches::Observations& o, const std::vector<double>& residuals, int finger) {
+  ScatterSums sums;
+  const double dof = 1 - 1.0 / o.fingers;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k] || FingersCompared(o, residuals, k) < o.fingers) continue;
+    double own = 0, others = 0;
+    for (int i = 0; i < o.fingers; ++i) {
+      const double residual_s = residuals[static_cast<size_t>(k) * o.fingers + i];
+      (i == finger ? own : others) += residual_s * residual_s / dof;
+    }
+    others /= o.fingers - 1;
+    sums.touches += 1, sums.own += own, sums.others += others;
+    sums.apart[o.pose[k]] += own - others;
+  }
+  return sums;
+}
+
+}  // namespace
+
+std::optional<FingerScatter> FindFingerScatter(const touches::Observations& o,
+                                               const std::vector<double>& residuals) {
+  if (o.fingers < 3) return std::nullopt;
+  std::optional<FingerScatter> found;
+  double largest = 0;
+  for (int i = 0; i < o.fingers; ++i) {
+    const ScatterSums sums = SumSquares(o, residuals, i);
+    if (static_cast<int>(sums.apart.size()) < kMinPosesCompared || !(sums.others > 0)) continue;
+    double squares = 0;
+    for (const auto& [pose, apart] : sums.apart) squares += apart * apart;
+    const double ratio = std::sqrt(sums.own / sums.others);
+    const double z = std::abs(sums.own - sums.others) / std::sqrt(squares);
+    const double p = std::min(1.0, o.fingers * std::erfc(z / std::sqrt(2.0)));
+    if (p > kMaxChance || std::abs(std::log(ratio)) < std::log1p(kMinRelativeDifference)) continue;
+    if (std::abs(std::log(ratio)) <= largest) continue;
+    largest = std::abs(std::log(ratio));
+    found = {i, std::sqrt(sums.own / sums.touches), std::sqrt(sums.others / sums.touches), p};
+  }
+  return found;
+}
+
+}  // namespace touchstone::diagnosis::residuals
