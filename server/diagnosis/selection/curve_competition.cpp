@@ -177,10 +177,15 @@ class Competition {
       own = std::max(own, without.log_evidence +
                               OneFingerNats(*named->model.base().effects[steps[0]].effect, curves[0]));
     const double behind = without.log_evidence - own;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> beside, CurvesOver(*named, covariate));
+    // What the curve says beside the effects as well is no rival of theirs.
+    const double any_beside = beside.empty() ? 0 : std::max(0.0, beside[0].any_gain_nats);
     for (const std::string& name : names)
-      NoteRival(name, behind + curves[0].any_gain_nats, RivalInWords(curves[0]));
+      NoteRival(name, behind + curves[0].any_gain_nats - any_beside, RivalInWords(curves[0]));
     if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteCorrelatedNoise(steps[0], *named, without));
     if (!IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
+    const double with_both = named->log_evidence + (beside.empty() ? 0 : std::max(0.0, beside[0].gain_nats));
+    if (without.log_evidence + curves[0].gain_nats < with_both - kSimplerNats) return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
     return true;
