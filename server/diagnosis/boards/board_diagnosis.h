@@ -15,6 +15,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_set.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/engine/parameter_estimate.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
@@ -54,6 +55,7 @@ struct BoardDiagnosis {
   std::string model_name, model_hash;
   int pictures = 0, corners = 0;                  // that took part; corners of all pictures
   std::optional<engine::Quality> initial, final;  // none with kTooLittleData
+  std::optional<engine::NothingMissing> nothing_missing;  // of the given model; none with kTooLittleData
   engine::NoiseFloor noise;
   std::vector<engine::LadderStep> steps;
   std::vector<engine::ConfoundedEffects> confounded;

@@ -223,6 +223,26 @@ absl::StatusOr<std::vector<double>> PhotoRows::PredictOthersNear(const model::Mo
   return near;
 }
 
+Eigen::MatrixXd PhotoRows::RowsOfAdded(int columns, const AddedGrey& grey) const {
+  Eigen::MatrixXd added(rows(), columns);
+  ParallelFor(pool_, static_cast<int>(views_.size()), 1, [&](int begin, int end) {
+    Eigen::MatrixXf cells(columns, grid_.size());
+    for (int v = begin; v < end; ++v) {
+      const View& view = *views_[v];
+      for (int cell = 0; cell < grid_.size(); ++cell) {
+        const int left = cell % grid_.columns() * grid_.cell, top = cell / grid_.columns() * grid_.cell;
+        const int right = std::min(left + grid_.cell, grid_.width),
+                  bottom = std::min(top + grid_.cell, grid_.height);
+        grey(view.k, (left + right - 1) / 2, (top + bottom - 1) / 2, cells.col(cell).data());
+        cells.col(cell) *= static_cast<float>((right - left) * (bottom - top)) * view.weights[cell];
+      }
+      added.middleRows(first_row_[v], view.basis.rows()) =
+          (view.basis * cells.transpose()).cast<double>();
+    }
+  });
+  return added;
+}
+
 Eigen::VectorXd PhotoRows::Residual(const std::vector<double>& predicted) const {
   return measured_ - Eigen::Map<const Eigen::VectorXd>(predicted.data(), rows());
 }

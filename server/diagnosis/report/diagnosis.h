@@ -13,6 +13,7 @@
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/engine/detectability.h"
 #include "server/diagnosis/engine/effect_explanation.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/joint/session_changes.h"
@@ -205,6 +206,9 @@ struct Diagnosis {
   std::vector<std::string> warnings;  // what limits all this
   double duration_s = 0;
 };
+
+// None: not assessed.
+void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagnosis* diagnosis);
 
 // The share of a squared error that is the model's, not noise: 0 to 1.
 double ReducibleShare(const NoiseFloor& floor, double rmse);
