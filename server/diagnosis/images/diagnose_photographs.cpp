@@ -7,7 +7,6 @@
 #include "server/diagnosis/images/photo_ladder.h"
 #include "server/diagnosis/images/photo_quality.h"
 #include "server/diagnosis/images/photo_search.h"
-#include "server/diagnosis/images/photos_nothing_missing.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -73,12 +72,9 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
     diagnosis.images_needed = kMinPoses;
   } else {
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const engine::TriedPValues tried,
-                                TryOnPhotographs(input, expectation->photographs, expectation->before,
-                                                 *diagnosis.initial, context));
-    diagnosis.nothing_missing = engine::WorstOfAll(tried);
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
                                 SelectPhotoExplanation(input, expectation->photographs, context));
+    diagnosis.nothing_missing = engine::WorstOfAll(selection.tried);
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
     expectation->left = FindExplanationsLeft(selection);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,

@@ -1,5 +1,7 @@
 #include "server/diagnosis/images/photo_rows.h"
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 
@@ -241,6 +243,24 @@ Eigen::MatrixXd PhotoRows::RowsOfAdded(int columns, const AddedGrey& grey) const
     }
   });
   return added;
+}
+
+std::vector<Eigen::MatrixXd> PhotoRows::NoiseFactors(double contour_px2,
+                                                     const std::vector<image::Photo>& expected) const {
+  std::vector<Eigen::MatrixXd> factors(views_.size());
+  ParallelFor(pool_, static_cast<int>(views_.size()), 1, [&](int begin, int end) {
+    for (int v = begin; v < end; ++v) {
+      const View& view = *views_[v];
+      const Eigen::VectorXf other =
+          CellWeights(grid_, expected[view.k].grey, *photographs_.record, contour_px2);
+      const Eigen::VectorXf ratio =
+          (other.array() > 0).select(view.weights.array() / other.array(), Eigen::ArrayXf::Ones(other.size()));
+      const Eigen::MatrixXf scaled = view.basis * ratio.asDiagonal();
+      const Eigen::MatrixXf noise = scaled * scaled.transpose();
+      factors[v] = Eigen::LLT<Eigen::MatrixXd>(noise.cast<double>()).matrixL();
+    }
+  });
+  return factors;
 }
 
 Eigen::VectorXd PhotoRows::Residual(const std::vector<double>& predicted) const {

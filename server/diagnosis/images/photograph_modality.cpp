@@ -3,7 +3,6 @@
 #include "server/base/status.h"
 #include "server/diagnosis/images/diagnose_photographs.h"
 #include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photos_nothing_missing.h"
 
 namespace touchstone::diagnosis::images {
 
@@ -14,12 +13,6 @@ absl::StatusOr<std::unique_ptr<PhotographModality>> PhotographModality::Make(
   made->input_.set = nullptr;
   made->context_ = context;
   TOUCHSTONE_ASSIGN_OR_RETURN(made->photographs_, MakePhotographs(made->input_, context.pool));
-  Expectation given;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const PhotographDiagnosis compared,
-                              ComparePhotographs(made->input_, context, &given));
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      made->tried_,
-      TryOnPhotographs(made->input_, made->photographs_, given.before, *compared.initial, context));
   TOUCHSTONE_ASSIGN_OR_RETURN(made->found_,
                               SelectPhotoExplanation(made->input_, made->photographs_, context));
   return made;

@@ -4,58 +4,68 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photo_search.h"
 #include "server/diagnosis/images/photo_terms.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr PhotoRowsOptions kTriedRows = {1600, 1, 15};
 constexpr double kRoundingGrey = 0.3;  // what 8-bit pixels without noise are off by, about
 
-class Tester {
+class PhotoTester {
  public:
-  Tester(const DiagnosisInput& input, const Photographs& photographs, const std::vector<image::Photo>& before)
-      : input_(input), photographs_(photographs), before_(before) {}
+  PhotoTester(const DiagnosisInput& input, const Photographs& photographs, const PhotoSearch& search,
+              ThreadPool* pool)
+      : input_(input), photographs_(photographs), search_(search), rows_(*search.rows), pool_(pool) {}
 
-  absl::StatusOr<engine::TriedPValues> Run(const engine::Quality& initial, const DiagnosisContext& context) {
-    PhotoRowsOptions options = kTriedRows;
-    options.contour_px2 = ContourPlaceVariance(photographs_, before_, context.pool);
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        search_, MakePhotoSearch(photographs_, *input_.model, PhotoCandidates(input_, photographs_), options,
-                                 context));
-    search_.experiment->settled = input_.settled;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const engine::GivenAndEffects tried,
+  absl::StatusOr<engine::TriedPValues> Run() {
+    TOUCHSTONE_ASSIGN_OR_RETURN(expected_, ExpectPhotographs(photographs_, *input_.model, true, pool_));
+    TOUCHSTONE_ASSIGN_OR_RETURN(engine::GivenAndEffects tried,
                                 engine::ColumnsOfEffects(*search_.search, *input_.model));
-    hypotheses_.AddEffects(*search_.rows, tried.effects);
+    factors_ = rows_.NoiseFactors(ContourPlaceVariance(photographs_, expected_, pool_), expected_);
+    for (engine::EffectColumns& effect : tried.effects) effect.columns = Whitened(std::move(effect.columns));
+    hypotheses_.AddEffects(rows_, tried.effects);
     AddCurves();
     AddPictures();
+    engine::Quality quality = QualityOfPhotographs(photographs_, expected_, 0, pool_);
     // What is left is what pixels are rounded to: it has no noise, and its pattern is that of rounding.
-    if (initial.rmse < kRoundingGrey) return engine::AgreeingPValues(hypotheses_.size() + 1);
-    const Eigen::MatrixXd linear = hypotheses_.PValues(
-        engine::DataAndNoise(*search_.rows, tried.given.columns.values.col(0), input_.seed));
+    if (quality.rmse < kRoundingGrey) return engine::AgreeingPValues(hypotheses_.size() + 1);
+    AssessByPixels(photographs_, NoiseFloorOfPhotographs(photographs_, expected_, pool_), &quality);
+    const Eigen::VectorXd residual = Whitened(tried.given.columns.values.col(0));
+    const Eigen::MatrixXd linear =
+        hypotheses_.PValues(engine::DataAndNoise(rows_, residual, input_.seed));
     engine::TriedPValues p_values = engine::TriedPValues::Ones(linear.rows() + 1, linear.cols());
     p_values.topRows(linear.rows()) = linear;
-    p_values(linear.rows(), 0) = initial.lack_of_fit_p;
+    p_values(linear.rows(), 0) = quality.lack_of_fit_p;
     return p_values;
   }
 
  private:
+  // Rows in which the noise is white.
+  Eigen::MatrixXd Whitened(Eigen::MatrixXd columns) const {
+    if (columns.cols() == 0) return columns;
+    const std::vector<int>& first = rows_.first_row();
+    for (size_t v = 0; v < factors_.size(); ++v) {
+      auto own = columns.middleRows(first[v], first[v + 1] - first[v]);
+      factors_[v].triangularView<Eigen::Lower>().solveInPlace(own);
+    }
+    return columns;
+  }
+
   // The terms that formulas are made of.
   void AddCurves() {
     const PhotoTermDictionary dictionary = MakePhotoTerms(photographs_);
     const int functions = static_cast<int>(dictionary.functions.size());
     std::vector<std::unique_ptr<PixelReader>> readers;
     for (int k = 0; k < photographs_.size(); ++k)
-      readers.push_back(std::make_unique<PixelReader>(photographs_, *input_.model, k, before_[k]));
+      readers.push_back(std::make_unique<PixelReader>(photographs_, *input_.model, k, expected_[k]));
     const Eigen::MatrixXd added =
-        search_.rows->RowsOfAdded(2 * functions, [&](int k, int column, int row, float* columns) {
+        Whitened(rows_.RowsOfAdded(2 * functions, [&](int k, int column, int row, float* columns) {
           const effects::PhotoPixel pixel = readers[k]->At(column, row);
           for (int f = 0; f < functions; ++f) {
             columns[f] = static_cast<float>(dictionary.functions[f](pixel));
             columns[functions + f] = static_cast<float>(pixel.grey) * columns[f];
           }
-        });
+        }));
     for (const PhotoTerm& term : dictionary.terms) {
       Eigen::MatrixXd own(added.rows(), term.columns.size());
       for (size_t c = 0; c < term.columns.size(); ++c)
@@ -65,17 +75,20 @@ class Tester {
     }
   }
 
-  // Anything in one picture alone.
+  // Anything in one picture alone, of three or more.
   void AddPictures() {
-    const std::vector<int>& first = search_.rows->first_row();
+    const std::vector<int>& first = rows_.first_row();
     if (first.size() < 4) return;
     for (size_t v = 0; v + 1 < first.size(); ++v) hypotheses_.AddRows(first[v], first[v + 1] - first[v]);
   }
 
   const DiagnosisInput& input_;
   const Photographs& photographs_;
-  const std::vector<image::Photo>& before_;
-  PhotoSearch search_;
+  const PhotoSearch& search_;
+  const PhotoRows& rows_;
+  ThreadPool* pool_;
+  std::vector<image::Photo> expected_;     // of the given model, with details
+  std::vector<Eigen::MatrixXd> factors_;  // of the noise of each photograph's rows
   engine::LinearHypotheses hypotheses_;
 };
 
@@ -83,10 +96,9 @@ class Tester {
 
 absl::StatusOr<engine::TriedPValues> TryOnPhotographs(const DiagnosisInput& input,
                                                       const Photographs& photographs,
-                                                      const std::vector<image::Photo>& before,
-                                                      const engine::Quality& initial,
+                                                      const PhotoSearch& search,
                                                       const DiagnosisContext& context) {
-  return Tester(input, photographs, before).Run(initial, context);
+  return PhotoTester(input, photographs, search, context.pool).Run();
 }
 
 }  // namespace touchstone::diagnosis::images

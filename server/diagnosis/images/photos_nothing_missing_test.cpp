@@ -19,17 +19,17 @@ engine::NothingMissing TestOf(const HiddenCamera& rig) {
   DiagnosisContext context;
   context.pool = &pool;
   const DiagnosisInput input = MakePhotoInput(rig);
-  Expectation given;
-  const absl::StatusOr<PhotographDiagnosis> compared = ComparePhotographs(input, context, &given);
-  EXPECT_TRUE(compared.ok()) << compared.status();
-  const absl::StatusOr<engine::TriedPValues> tried =
-      TryOnPhotographs(input, given.photographs, given.before, *compared->initial, context);
+  const absl::StatusOr<Photographs> photographs = MakePhotographs(input, &pool);
+  EXPECT_TRUE(photographs.ok()) << photographs.status();
+  const absl::StatusOr<PhotoSearch> search = MakePhotoSearch(
+      *photographs, *input.model, PhotoCandidates(input, *photographs), {1600, 2, 15}, context);
+  EXPECT_TRUE(search.ok()) << search.status();
+  const absl::StatusOr<engine::TriedPValues> tried = TryOnPhotographs(input, *photographs, *search, context);
   EXPECT_TRUE(tried.ok()) << tried.status();
   if (std::getenv("TRACE")) {
     Eigen::Index worst;
     tried->col(0).minCoeff(&worst);
-    std::cout << "worst " << worst << " of " << tried->rows() << " p " << tried->col(0)[worst] << " lack of fit "
-              << compared->initial->lack_of_fit_p << "\n";
+    std::cout << "worst " << worst << " of " << tried->rows() << " p " << tried->col(0)[worst] << " lack of fit " << (*tried)(tried->rows() - 1, 0) << "\n";
   }
   return tried.ok() ? engine::WorstOfAll(*tried) : engine::NothingMissing();
 }
@@ -80,10 +80,10 @@ TEST(PhotosNothingMissing, Profile) {
     auto d = DiagnosePhotographs(input, context);
     std::cout << side << " px: diagnosis " << now() - t << " s, p " << d->nothing_missing->p << " over "
               << d->nothing_missing->hypotheses << "\n";
-    Expectation given;
-    auto compared = ComparePhotographs(input, context, &given);
+    auto photographs = MakePhotographs(input, &pool);
+    auto search = MakePhotoSearch(*photographs, *input.model, PhotoCandidates(input, *photographs), {1600, 2, 15}, context);
     t = now();
-    auto tried = TryOnPhotographs(input, given.photographs, given.before, *compared->initial, context);
+    auto tried = TryOnPhotographs(input, *photographs, *search, context);
     std::cout << "  tried " << now() - t << " s\n";
   }
 }
