@@ -172,7 +172,7 @@ std::string MissingEffects(const v1::Report& report) {
                       Falls(scale, from, to), reached ? ", the noise floor." : ".");
 }
 
-// Of a report without P(nothing is missing); empty: a comparison, or a report of a plan.
+// Of a report without P(nothing is missing); empty: a comparison, a plan, a report of a version that had none.
 std::string WhyNotAssessed(const v1::Report& report) {
   switch (report.verdict()) {
     case v1::Report::VERDICT_UNSPECIFIED:
@@ -183,7 +183,7 @@ std::string WhyNotAssessed(const v1::Report& report) {
       return "there is too little data";
     default:
       return MainData(report).has_distributions() ? "touches without poses are compared as distributions"
-                                                  : "nothing was drawn from the given model";
+                                                  : "";
   }
 }
 

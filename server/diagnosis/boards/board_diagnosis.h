@@ -53,8 +53,8 @@ struct BoardLens {
 struct BoardDiagnosis {
   engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
-  int pictures = 0, corners = 0;                  // that took part; corners of all pictures
-  std::optional<engine::Quality> initial, final;  // none with kTooLittleData
+  int pictures = 0, corners = 0;                          // that took part; corners of all pictures
+  std::optional<engine::Quality> initial, final;          // none with kTooLittleData
   std::optional<engine::NothingMissing> nothing_missing;  // of the given model; none with kTooLittleData
   engine::NoiseFloor noise;
   std::vector<engine::LadderStep> steps;

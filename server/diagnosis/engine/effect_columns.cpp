@@ -21,9 +21,9 @@ absl::StatusOr<GivenAndEffects> ColumnsOfEffects(const StepwiseSearch& search, c
     if (by_object && shared != on_all_objects.end()) {
       own.shared = shared->second;
     } else {
-      TOUCHSTONE_ASSIGN_OR_RETURN(own.columns,
-                                  Derivatives(experiment, extension.start, extension.start.Start(),
-                                              all.given.predicted, all.given.model.size()));
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          own.columns, Derivatives(experiment, extension.start, extension.start.Start(), all.given.predicted,
+                                   all.given.model.size()));
       if (extension.candidate >= 0 && !by_object)
         on_all_objects.emplace(extension.name, static_cast<int>(all.effects.size()));
     }

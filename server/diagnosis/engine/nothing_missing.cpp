@@ -103,7 +103,9 @@ Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics) {
   return p_values;
 }
 
-TriedPValues AgreeingPValues(int hypotheses) { return TriedPValues::Ones(hypotheses, 1 + kNoiseDraws); }
+TriedPValues AgreeingPValues(int hypotheses) {
+  return TriedPValues::Ones(hypotheses, 1 + kNoiseDraws);
+}
 
 TriedPValues ImpossiblePValues(int hypotheses) {
   TriedPValues p_values = AgreeingPValues(hypotheses);

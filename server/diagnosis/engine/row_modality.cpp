@@ -27,8 +27,8 @@ absl::StatusOr<std::unique_ptr<RowModality>> RowModality::Make(Description descr
   const ObservationModel& rows = *made->description_.rows;
   LinearHypotheses hypotheses(rows.EliminatedValues());
   hypotheses.AddEffects(rows, columns.effects);
-  made->tried_ = hypotheses.PValues(
-      DataAndNoise(rows, columns.given.columns.values.col(0), made->description_.seed));
+  made->tried_ =
+      hypotheses.PValues(DataAndNoise(rows, columns.given.columns.values.col(0), made->description_.seed));
   return made;
 }
 

@@ -238,8 +238,7 @@ Eigen::MatrixXd PhotoRows::RowsOfAdded(int columns, const AddedGrey& grey) const
         grey(view.k, (left + right - 1) / 2, (top + bottom - 1) / 2, cells.col(cell).data());
         cells.col(cell) *= static_cast<float>((right - left) * (bottom - top)) * view.weights[cell];
       }
-      added.middleRows(first_row_[v], view.basis.rows()) =
-          (view.basis * cells.transpose()).cast<double>();
+      added.middleRows(first_row_[v], view.basis.rows()) = (view.basis * cells.transpose()).cast<double>();
     }
   });
   return added;
@@ -254,7 +253,8 @@ std::vector<Eigen::MatrixXd> PhotoRows::NoiseFactors(double contour_px2,
       const Eigen::VectorXf other =
           CellWeights(grid_, expected[view.k].grey, *photographs_.record, contour_px2);
       const Eigen::VectorXf ratio =
-          (other.array() > 0).select(view.weights.array() / other.array(), Eigen::ArrayXf::Ones(other.size()));
+          (other.array() > 0)
+              .select(view.weights.array() / other.array(), Eigen::ArrayXf::Ones(other.size()));
       const Eigen::MatrixXf scaled = view.basis * ratio.asDiagonal();
       const Eigen::MatrixXf noise = scaled * scaled.transpose();
       factors[v] = Eigen::LLT<Eigen::MatrixXd>(noise.cast<double>()).matrixL();

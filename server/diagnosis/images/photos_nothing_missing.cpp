@@ -31,8 +31,7 @@ class PhotoTester {
     if (quality.rmse < kRoundingGrey) return engine::AgreeingPValues(hypotheses_.size() + 1);
     AssessByPixels(photographs_, NoiseFloorOfPhotographs(photographs_, expected_, pool_), &quality);
     const Eigen::VectorXd residual = Whitened(tried.given.columns.values.col(0));
-    const Eigen::MatrixXd linear =
-        hypotheses_.PValues(engine::DataAndNoise(rows_, residual, input_.seed));
+    const Eigen::MatrixXd linear = hypotheses_.PValues(engine::DataAndNoise(rows_, residual, input_.seed));
     engine::TriedPValues p_values = engine::TriedPValues::Ones(linear.rows() + 1, linear.cols());
     p_values.topRows(linear.rows()) = linear;
     p_values(linear.rows(), 0) = quality.lack_of_fit_p;
@@ -87,7 +86,7 @@ class PhotoTester {
   const PhotoSearch& search_;
   const PhotoRows& rows_;
   ThreadPool* pool_;
-  std::vector<image::Photo> expected_;     // of the given model, with details
+  std::vector<image::Photo> expected_;    // of the given model, with details
   std::vector<Eigen::MatrixXd> factors_;  // of the noise of each photograph's rows
   engine::LinearHypotheses hypotheses_;
 };

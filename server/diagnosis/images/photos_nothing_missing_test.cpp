@@ -29,7 +29,8 @@ engine::NothingMissing TestOf(const HiddenCamera& rig) {
   if (std::getenv("TRACE")) {
     Eigen::Index worst;
     tried->col(0).minCoeff(&worst);
-    std::cout << "worst " << worst << " of " << tried->rows() << " p " << tried->col(0)[worst] << " lack of fit " << (*tried)(tried->rows() - 1, 0) << "\n";
+    std::cout << "worst " << worst << " of " << tried->rows() << " p " << tried->col(0)[worst]
+              << " lack of fit " << (*tried)(tried->rows() - 1, 0) << "\n";
   }
   return tried.ok() ? engine::WorstOfAll(*tried) : engine::NothingMissing();
 }
@@ -56,10 +57,17 @@ TEST(PhotosNothingMissing, HasAUniformPWhereNothingIsHidden) {
 
 TEST(PhotosNothingMissing, Trace) {
   HiddenCamera rig = SmallCamera(1);
-  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{
-           {"exposure", "stops=0"}, {"exposure", "stops=0.01"}, {"exposure", "stops=0.03"}, {"exposure", "stops=0.1"},
-           {"camera_rotation", "rotation_deg=0.02,0,0"}, {"camera_rotation", "rotation_deg=0.05,0,0"}, {"camera_rotation", "rotation_deg=0.2,0,0"},
-           {"defocus_blur", "sigma_px=0.3"}, {"defocus_blur", "sigma_px=0.6"}, {"radial_distortion", "k1=0.02"}}) {
+  for (const auto& [name, value] :
+       std::vector<std::pair<std::string, std::string>>{{"exposure", "stops=0"},
+                                                        {"exposure", "stops=0.01"},
+                                                        {"exposure", "stops=0.03"},
+                                                        {"exposure", "stops=0.1"},
+                                                        {"camera_rotation", "rotation_deg=0.02,0,0"},
+                                                        {"camera_rotation", "rotation_deg=0.05,0,0"},
+                                                        {"camera_rotation", "rotation_deg=0.2,0,0"},
+                                                        {"defocus_blur", "sigma_px=0.3"},
+                                                        {"defocus_blur", "sigma_px=0.6"},
+                                                        {"radial_distortion", "k1=0.02"}}) {
     rig.hidden = {{name, {value}}};
     std::cout << name << " " << value << ": " << TestOf(rig).p << "\n";
   }
@@ -81,7 +89,8 @@ TEST(PhotosNothingMissing, Profile) {
     std::cout << side << " px: diagnosis " << now() - t << " s, p " << d->nothing_missing->p << " over "
               << d->nothing_missing->hypotheses << "\n";
     auto photographs = MakePhotographs(input, &pool);
-    auto search = MakePhotoSearch(*photographs, *input.model, PhotoCandidates(input, *photographs), {1600, 2, 15}, context);
+    auto search = MakePhotoSearch(*photographs, *input.model, PhotoCandidates(input, *photographs),
+                                  {1600, 2, 15}, context);
     t = now();
     auto tried = TryOnPhotographs(input, *photographs, *search, context);
     std::cout << "  tried " << now() - t << " s\n";

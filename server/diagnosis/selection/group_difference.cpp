@@ -46,7 +46,8 @@ struct Difference {
 
 class DifferenceSearch {
  public:
-  DifferenceSearch(const Workspace& workspace, const engine::GivenAndEffects& columns, const SelectionResult& found)
+  DifferenceSearch(const Workspace& workspace, const engine::GivenAndEffects& columns,
+                   const SelectionResult& found)
       : workspace_(workspace),
         columns_(columns),
         found_(found),

@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
-#include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/selection/group_difference.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
