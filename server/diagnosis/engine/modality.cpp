@@ -24,7 +24,7 @@ absl::StatusOr<HeldOutError> Modality::HeldOut(const Fit& /*searched*/, const Fi
 std::optional<NothingMissing> NothingMissingOf(const std::vector<const Modality*>& modalities) {
   std::vector<const TriedPValues*> kinds;
   for (const Modality* modality : modalities) kinds.push_back(&modality->tried());
-  return WorstOfAll(kinds);
+  return WorstOfKinds(kinds);
 }
 
 }  // namespace touchstone::diagnosis::engine

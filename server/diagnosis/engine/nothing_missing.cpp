@@ -125,7 +125,7 @@ NothingMissing WorstOfAll(const TriedPValues& p_values) {
   return worst;
 }
 
-std::optional<NothingMissing> WorstOfAll(const std::vector<const TriedPValues*>& kinds) {
+std::optional<NothingMissing> WorstOfKinds(const std::vector<const TriedPValues*>& kinds) {
   if (kinds.empty()) return std::nullopt;
   Eigen::Index hypotheses = 0, draws = kinds[0]->cols() - 1;
   for (const TriedPValues* kind : kinds) {

@@ -66,6 +66,6 @@ struct NothingMissing {
 };
 NothingMissing WorstOfAll(const TriedPValues& p_values);
 // Over the hypotheses of all kinds, whose noise is independent. None: a kind cannot say, or there is none.
-std::optional<NothingMissing> WorstOfAll(const std::vector<const TriedPValues*>& kinds);
+std::optional<NothingMissing> WorstOfKinds(const std::vector<const TriedPValues*>& kinds);
 
 }  // namespace touchstone::diagnosis::engine

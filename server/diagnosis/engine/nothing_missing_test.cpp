@@ -57,22 +57,22 @@ TEST(NothingMissing, IsUniformOverTheHypothesesOfSeveralKinds) {
       return hypotheses.PValues(DataAndNoise(rows, rows.Random(2 * set + kind, 1 + kind), set, kDraws));
     };
     const TriedPValues first = tried(0), second = tried(1);
-    p.push_back(WorstOfAll({&first, &second})->p);
+    p.push_back(WorstOfKinds({&first, &second})->p);
   }
   ExpectUniform(p);
 }
 
 TEST(NothingMissing, OfSeveralKindsIsThatOfTheWorst) {
   const TriedPValues agreeing = AgreeingPValues(7), impossible = ImpossiblePValues(3);
-  EXPECT_EQ(WorstOfAll({&agreeing})->p, 1);
-  EXPECT_EQ(WorstOfAll({&agreeing, &impossible})->p, 0);
-  EXPECT_EQ(WorstOfAll({&agreeing, &impossible})->hypotheses, 10);
+  EXPECT_EQ(WorstOfKinds({&agreeing})->p, 1);
+  EXPECT_EQ(WorstOfKinds({&agreeing, &impossible})->p, 0);
+  EXPECT_EQ(WorstOfKinds({&agreeing, &impossible})->hypotheses, 10);
 }
 
 TEST(NothingMissing, IsNotSaidWhereAKindCannotSay) {
   const TriedPValues agreeing = AgreeingPValues(7), none;
-  EXPECT_FALSE(WorstOfAll({&agreeing, &none}));
-  EXPECT_FALSE(WorstOfAll(std::vector<const TriedPValues*>()));
+  EXPECT_FALSE(WorstOfKinds({&agreeing, &none}));
+  EXPECT_FALSE(WorstOfKinds(std::vector<const TriedPValues*>()));
 }
 
 TEST(NothingMissing, IsSmallWhereOneEffectIs) {

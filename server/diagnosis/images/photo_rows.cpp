@@ -244,14 +244,25 @@ Eigen::MatrixXd PhotoRows::RowsOfAdded(int columns, const AddedGrey& grey) const
   return added;
 }
 
-std::vector<Eigen::MatrixXd> PhotoRows::NoiseFactors(double contour_px2,
+Eigen::VectorXd PhotoRows::RowsOfChange(const std::vector<image::Photo>& from,
+                                        const std::vector<image::Photo>& to) const {
+  Eigen::VectorXd change(rows());
+  for (size_t v = 0; v < views_.size(); ++v) {
+    const int k = views_[v]->k;
+    change.segment(first_row_[v], first_row_[v + 1] - first_row_[v]) =
+        views_[v]->Project(grid_, to[k].grey) - views_[v]->Project(grid_, from[k].grey);
+  }
+  return change;
+}
+
+std::vector<Eigen::MatrixXd> PhotoRows::NoiseFactors(const RecordTable& record, double contour_px2,
                                                      const std::vector<image::Photo>& expected) const {
   std::vector<Eigen::MatrixXd> factors(views_.size());
   ParallelFor(pool_, static_cast<int>(views_.size()), 1, [&](int begin, int end) {
     for (int v = begin; v < end; ++v) {
       const View& view = *views_[v];
       const Eigen::VectorXf other =
-          CellWeights(grid_, expected[view.k].grey, *photographs_.record, contour_px2);
+          CellWeights(grid_, expected[view.k].grey, record, contour_px2);
       const Eigen::VectorXf ratio =
           (other.array() > 0)
               .select(view.weights.array() / other.array(), Eigen::ArrayXf::Ones(other.size()));

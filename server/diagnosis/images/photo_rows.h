@@ -73,9 +73,13 @@ class PhotoRows : public engine::ObservationModel {
   // in the middle of a cell of photograph k, whose other pixels get the same. Called from several threads.
   using AddedGrey = std::function<void(int k, int column, int row, float* columns)>;
   Eigen::MatrixXd RowsOfAdded(int columns, const AddedGrey& grey) const;
-  // Of each photograph that takes part, the Cholesky factor of its rows' noise where the place of contours varies by so much
-  // (px^2) instead of as the rows were made for. `expected`: by photograph of the set, what the anchor expects.
-  std::vector<Eigen::MatrixXd> NoiseFactors(double contour_px2,
+  // What pictures of the whole set differ by, as rows.
+  Eigen::VectorXd RowsOfChange(const std::vector<image::Photo>& from,
+                               const std::vector<image::Photo>& to) const;
+  // Of each photograph that takes part, the Cholesky factor of its rows' noise where pixels have this noise and the place of
+  // contours varies by so much (px^2) instead of as the rows were made for. `expected`: by photograph of the set, what the
+  // anchor expects.
+  std::vector<Eigen::MatrixXd> NoiseFactors(const RecordTable& record, double contour_px2,
                                             const std::vector<image::Photo>& expected) const;
   // First row of each photograph that takes part, then the number of rows.
   const std::vector<int>& first_row() const { return first_row_; }
