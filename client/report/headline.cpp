@@ -182,9 +182,12 @@ std::string WhyNotAssessed(const v1::Report& report) {
     case v1::Report::TOO_LITTLE_DATA:
       return "there is too little data";
     default:
-      return MainData(report).has_distributions() ? "touches without poses are compared as distributions"
-                                                  : "";
+      break;
   }
+  if (MainData(report).has_distributions()) return "touches without poses are compared as distributions";
+  for (const v1::DataReport& data : report.data())
+    if (data.kind() == v1::DataReport::PHOTOGRAPHS) return "photographs have no such test";
+  return "";
 }
 
 }  // namespace

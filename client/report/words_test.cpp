@@ -105,6 +105,10 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
   EXPECT_EQ(NothingMissingWords(TooLittleDataReport()),
             "P(nothing is missing) is not assessed: there is too little data.");
   EXPECT_EQ(NothingMissingWords(CompareReport()), "");
+  report.clear_p_nothing_missing();
+  report.add_data()->set_kind(v1::DataReport::PHOTOGRAPHS);
+  EXPECT_EQ(NothingMissingWords(report),
+            "P(nothing is missing) is not assessed: photographs have no such test.");
 }
 
 // An effect of the catalogue that acts in one round: not "in a way that no built-in effect explains".

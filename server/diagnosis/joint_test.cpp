@@ -6,7 +6,6 @@
 
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
-#include "server/diagnosis/diagnose.h"
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/joint_test_set.h"
@@ -84,30 +83,6 @@ TEST(SharedEffects, NothingIsFoundWhereNothingIsMissing) {
   const SharedEffects found = Found(WithHidden({}));
   EXPECT_TRUE(found.steps.empty());
   EXPECT_TRUE(found.conflicts.empty());
-}
-
-report::Diagnosis DiagnosedJointly(const HiddenSession& session) {
-  ThreadPool pool(2);
-  DiagnosisContext context;
-  context.pool = &pool;
-  absl::StatusOr<report::Diagnosis> diagnosis = Diagnose(MakeJointInput(session), context);
-  EXPECT_TRUE(diagnosis.ok()) << diagnosis.status();
-  return *std::move(diagnosis);
-}
-
-// Of the given model, over the hypotheses of both kinds.
-TEST(JointDiagnosis, HasOneChanceThatNothingIsMissing) {
-  TOUCHSTONE_SECOND_TIER("long: two whole diagnoses of touches and pictures");
-  const report::Diagnosis nothing = DiagnosedJointly(WithHidden({}));
-  ASSERT_TRUE(nothing.p_nothing_missing);
-  EXPECT_GT(*nothing.p_nothing_missing, 0.01);
-  HiddenSession session = WithHidden({});
-  session.camera.hidden = {{"exposure", {"stops=0.1"}}};
-  const report::Diagnosis darker = DiagnosedJointly(session);
-  ASSERT_TRUE(darker.p_nothing_missing);
-  EXPECT_LT(*darker.p_nothing_missing, 1e-3);
-  EXPECT_EQ(darker.hypotheses_tried, nothing.hypotheses_tried);
-  EXPECT_GT(nothing.hypotheses_tried, 300);
 }
 
 TEST(SharedEffects, ToolIsNotToldAsThePoseOfObjects) {

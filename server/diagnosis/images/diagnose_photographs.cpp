@@ -74,7 +74,6 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
                                 SelectPhotoExplanation(input, expectation->photographs, context));
-    diagnosis.nothing_missing = engine::WorstOfAll(selection.tried);
     TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
     expectation->left = FindExplanationsLeft(selection);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,

@@ -1,7 +1,5 @@
 #include "server/diagnosis/images/photo_rows.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 
@@ -223,55 +221,6 @@ absl::StatusOr<std::vector<double>> PhotoRows::PredictOthersNear(const model::Mo
     }
   }
   return near;
-}
-
-Eigen::MatrixXd PhotoRows::RowsOfAdded(int columns, const AddedGrey& grey) const {
-  Eigen::MatrixXd added(rows(), columns);
-  ParallelFor(pool_, static_cast<int>(views_.size()), 1, [&](int begin, int end) {
-    Eigen::MatrixXf cells(columns, grid_.size());
-    for (int v = begin; v < end; ++v) {
-      const View& view = *views_[v];
-      for (int cell = 0; cell < grid_.size(); ++cell) {
-        const int left = cell % grid_.columns() * grid_.cell, top = cell / grid_.columns() * grid_.cell;
-        const int right = std::min(left + grid_.cell, grid_.width),
-                  bottom = std::min(top + grid_.cell, grid_.height);
-        grey(view.k, (left + right - 1) / 2, (top + bottom - 1) / 2, cells.col(cell).data());
-        cells.col(cell) *= static_cast<float>((right - left) * (bottom - top)) * view.weights[cell];
-      }
-      added.middleRows(first_row_[v], view.basis.rows()) = (view.basis * cells.transpose()).cast<double>();
-    }
-  });
-  return added;
-}
-
-Eigen::VectorXd PhotoRows::RowsOfChange(const std::vector<image::Photo>& from,
-                                        const std::vector<image::Photo>& to) const {
-  Eigen::VectorXd change(rows());
-  for (size_t v = 0; v < views_.size(); ++v) {
-    const int k = views_[v]->k;
-    change.segment(first_row_[v], first_row_[v + 1] - first_row_[v]) =
-        views_[v]->Project(grid_, to[k].grey) - views_[v]->Project(grid_, from[k].grey);
-  }
-  return change;
-}
-
-std::vector<Eigen::MatrixXd> PhotoRows::NoiseFactors(const RecordTable& record, double contour_px2,
-                                                     const std::vector<image::Photo>& expected) const {
-  std::vector<Eigen::MatrixXd> factors(views_.size());
-  ParallelFor(pool_, static_cast<int>(views_.size()), 1, [&](int begin, int end) {
-    for (int v = begin; v < end; ++v) {
-      const View& view = *views_[v];
-      const Eigen::VectorXf other =
-          CellWeights(grid_, expected[view.k].grey, record, contour_px2);
-      const Eigen::VectorXf ratio =
-          (other.array() > 0)
-              .select(view.weights.array() / other.array(), Eigen::ArrayXf::Ones(other.size()));
-      const Eigen::MatrixXf scaled = view.basis * ratio.asDiagonal();
-      const Eigen::MatrixXf noise = scaled * scaled.transpose();
-      factors[v] = Eigen::LLT<Eigen::MatrixXd>(noise.cast<double>()).matrixL();
-    }
-  });
-  return factors;
 }
 
 Eigen::VectorXd PhotoRows::Residual(const std::vector<double>& predicted) const {

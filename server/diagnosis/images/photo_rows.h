@@ -6,7 +6,6 @@
 // model that is near enough; predictions are exact everywhere, only derivatives by what moves the rays are the anchor's.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -68,21 +67,6 @@ class PhotoRows : public engine::ObservationModel {
                          const std::vector<double>& moved) const override;
   double DerivativeStep() const override { return 0.25; }
   bool HasRoughDerivatives(const model::Effect& effect) const override { return MovesRays(effect); }
-
-  // What grey levels that are added to the pixels would change, as rows; a column per number that `grey` writes for the pixel
-  // in the middle of a cell of photograph k, whose other pixels get the same. Called from several threads.
-  using AddedGrey = std::function<void(int k, int column, int row, float* columns)>;
-  Eigen::MatrixXd RowsOfAdded(int columns, const AddedGrey& grey) const;
-  // What pictures of the whole set differ by, as rows.
-  Eigen::VectorXd RowsOfChange(const std::vector<image::Photo>& from,
-                               const std::vector<image::Photo>& to) const;
-  // Of each photograph that takes part, the Cholesky factor of its rows' noise where pixels have this noise and the place of
-  // contours varies by so much (px^2) instead of as the rows were made for. `expected`: by photograph of the set, what the
-  // anchor expects.
-  std::vector<Eigen::MatrixXd> NoiseFactors(const RecordTable& record, double contour_px2,
-                                            const std::vector<image::Photo>& expected) const;
-  // First row of each photograph that takes part, then the number of rows.
-  const std::vector<int>& first_row() const { return first_row_; }
 
   // Where a smooth error of the objects' albedo enters: a share h of the light of a place.
   const engine::SmoothErrorGeometry& albedo() const { return albedo_; }

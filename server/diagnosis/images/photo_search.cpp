@@ -8,7 +8,6 @@
 #include "server/diagnosis/engine/held_out.h"
 #include "server/diagnosis/images/image_field.h"
 #include "server/diagnosis/images/photo_quality.h"
-#include "server/diagnosis/images/photos_nothing_missing.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::images {
@@ -135,13 +134,12 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
   return absl::OkStatus();
 }
 
-// What coarse cells say, and of the given model over all that is tried. Where it moves contours far, derivatives at the given model hide what else is missing: the search
+// What coarse cells say. Where it moves contours far, derivatives at the given model hide what else is missing: the search
 // goes on at what it has found.
 absl::StatusOr<engine::Explanation> ExplainCoarsely(const DiagnosisInput& input,
                                                     const Photographs& photographs,
                                                     const std::vector<engine::Candidate>& candidates,
-                                                    const DiagnosisContext& context,
-                                                    engine::TriedPValues* tried) {
+                                                    const DiagnosisContext& context) {
   engine::Explanation explanation;
   explanation.initial_effects = static_cast<int>(input.model->effects.size());
   model::Model anchor = *input.model;
@@ -154,7 +152,6 @@ absl::StatusOr<engine::Explanation> ExplainCoarsely(const DiagnosisInput& input,
     return made;
   };
   TOUCHSTONE_ASSIGN_OR_RETURN(PhotoSearch coarse, search(kCoarse, candidates));
-  TOUCHSTONE_ASSIGN_OR_RETURN(*tried, TryOnPhotographs(input, photographs, coarse, context));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       explanation.fit,
       engine::FitModel(*coarse.experiment, engine::Parameterization(*input.model, photographs.objects)));
@@ -269,7 +266,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   selection.initial_effects = static_cast<int>(input.model->effects.size());
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation explanation,
-                              ExplainCoarsely(input, photographs, candidates, context, &selection.tried));
+                              ExplainCoarsely(input, photographs, candidates, context));
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
   // Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel is depends on the noise.
   selection.photographs = std::make_unique<Photographs>(photographs);

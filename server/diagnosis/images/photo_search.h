@@ -7,7 +7,6 @@
 
 #include "server/diagnosis/engine/competition.h"
 #include "server/diagnosis/engine/fit.h"
-#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/images/photo_rows.h"
 #include "server/diagnosis/input.h"
 
@@ -58,8 +57,7 @@ struct PhotoSelection {
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
   // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
   double heldout_ratio = 1;
-  engine::TriedPValues tried;  // of the given model (photos_nothing_missing.h)
-  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
+  double albedo_nats = 0;  // evidence of a smooth error of the albedo over none
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,

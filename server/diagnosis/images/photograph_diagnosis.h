@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/engine/parameter_estimate.h"
 #include "server/diagnosis/engine/result.h"
 #include "server/model/model.h"
@@ -65,7 +64,6 @@ struct PhotographDiagnosis {
   int images = 0;  // that took part
   std::vector<std::string> objects;
   engine::NoiseFloor noise_floor;
-  std::optional<engine::NothingMissing> nothing_missing;  // of the given model; none: not assessed
   std::optional<engine::Quality> initial, final;
   double reducible_share = 0;  // of the mean square error that is not noise, 0 to 1
 

@@ -114,7 +114,6 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   data.reducible_share = found.reducible_share;
   AddWhere(found, set, &data);
   AddCauses(found, &diagnosis);
-  SetNothingMissing(found.nothing_missing, &diagnosis);
   diagnosis.uncertainty = found.uncertainty;
   for (const images::ProposedPhotograph& next : found.next_photographs) diagnosis.next.emplace_back(next);
   diagnosis.warnings = found.warnings;
