@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/base/random.h"
+#include "server/base/test_tier.h"
 #include "server/diagnosis/engine/linear_test_model.h"
 #include "server/diagnosis/engine/uniform_p_values.h"
 
@@ -49,6 +50,7 @@ TEST(NothingMissing, IsUniformWhereNothingIs) {
 
 // Two kinds with the same rows that draw from the same seed are the hardest case: their draws are equal.
 TEST(NothingMissing, IsUniformOverTheHypothesesOfSeveralKinds) {
+  TOUCHSTONE_SECOND_TIER("statistical: 500 sets of two kinds");
   const LinearHypotheses hypotheses = Hypotheses();
   const LinearTestModel rows(1, kReadings, 1);
   std::vector<double> p;
