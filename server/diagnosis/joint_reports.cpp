@@ -113,11 +113,12 @@ class JointDiagnoser {
     return absl::OkStatus();
   }
 
-  absl::StatusOr<joint::SharedEffects> FindShared() const {
+  absl::StatusOr<joint::SharedEffects> FindShared() {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches,
                                 selection::TouchModality::Make(touches_, Stretch(context_, 0.05, 0.15)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto photographs, images::PhotographModality::Make(
                                                             photographs_, Stretch(context_, 0.15, 0.25)));
+    parts_.nothing_missing = engine::NothingMissingOf({touches.get(), photographs.get()});
     const DiagnosisContext both = Stretch(context_, 0.25, 0.5);
     return joint::FindSharedEffects({touches.get(), photographs.get()}, *input_.model, [&](double done) {
       return !both.progress || both.progress("fitting both together", done);

@@ -73,7 +73,10 @@ class SessionsReporter {
     if (mistaken) return std::move(diagnosis_);
     TOUCHSTONE_RETURN_IF_ERROR(Search());
     if (modalities_.size() < 2) return TooLittle();
-    TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis_.sessions->changes, FindChanges());
+    std::vector<const engine::Modality*> taking_part;
+    for (const auto& modality : modalities_) taking_part.push_back(modality.get());
+    report::SetNothingMissing(engine::NothingMissingOf(taking_part), &diagnosis_);
+    TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis_.sessions->changes, FindChanges(taking_part));
     PutPhotographEffectsBack();
     for (int s = 0; s < count(); ++s) TOUCHSTONE_RETURN_IF_ERROR(DiagnoseOne(s));
     if (diagnosis_.verdict == Verdict::kCheckData) return MistakenAfterAll();
@@ -155,6 +158,7 @@ class SessionsReporter {
   // One that shows only once the effects of all sessions are in place.
   report::Diagnosis MistakenAfterAll() {
     diagnosis_.sessions->changes.reset();
+    report::SetNothingMissing(std::nullopt, &diagnosis_);
     for (report::DataReport& data : diagnosis_.data) data.final = data.initial;
     SayMistakes();
     return std::move(diagnosis_);
@@ -196,9 +200,8 @@ class SessionsReporter {
     return std::move(diagnosis_);
   }
 
-  absl::StatusOr<joint::SessionChanges> FindChanges() const {
-    std::vector<const engine::Modality*> sessions;
-    for (const auto& modality : modalities_) sessions.push_back(modality.get());
+  absl::StatusOr<joint::SessionChanges> FindChanges(
+      const std::vector<const engine::Modality*>& sessions) const {
     const DiagnosisContext all = Stretch(0.5, 0.6);
     return joint::FindSessionChanges(sessions, claimed_, [&](double done) {
       return !all.progress || all.progress("fitting all sessions together", done);

@@ -57,6 +57,8 @@ TEST(Sessions, WhatBothLackIsOneStepAndNoChange) {
   EXPECT_EQ(found.steps[0].effect, "tip_radius");
   EXPECT_NEAR(found.steps[0].parameters[0].value, 1.5, 4 * found.steps[0].parameters[0].std_error);
   EXPECT_TRUE(ChangedIn(found).empty());
+  EXPECT_LT(*found.p_nothing_missing, 1e-6);
+  EXPECT_GT(found.hypotheses_tried, 200);  // those of both
   ASSERT_EQ(found.data.size(), 2u);
   ASSERT_EQ(found.sessions->same_poses.size(), 1u);
   EXPECT_GT(found.sessions->same_poses[0].measured.p, 0.01);

@@ -224,8 +224,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
     if (!of_rows.empty()) return check_data(of_rows);
   }
   report::AddLadder(ladder, &diagnosis);
-  diagnosis.p_nothing_missing = selection.nothing_missing.p;
-  diagnosis.hypotheses_tried = selection.nothing_missing.hypotheses;
+  report::SetNothingMissing(engine::WorstOfAll(selection.tried), &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   // A part of a joint diagnosis describes what the model had left before anything was put in place.
   touches::Prediction initial = workspace->nominal;

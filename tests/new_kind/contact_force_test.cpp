@@ -175,6 +175,21 @@ TEST(ContactForces, WithTouchesAShiftOfTheObjectsIsOneValueAndTighterThanFromEit
   }
 }
 
+// One number over what was tried on both: a cause that only the forces show is seen among the hypotheses of all.
+TEST(ContactForces, WithTouchesTheChanceThatNothingIsMissingIsOneNumber) {
+  const auto touched = selection::TouchModality::Make(touches::MakeTestInput({}), {});
+  ASSERT_TRUE(touched.ok()) << touched.status();
+  const auto both = [&](const engine::RowModality& forces) {
+    return *engine::NothingMissingOf({touched->get(), &forces});
+  };
+  const auto nominal = ForcesOf({}, 0), stiffer = ForcesOf({}, 0.08);
+  const engine::NothingMissing nothing = both(*nominal), springs = both(*stiffer);
+  EXPECT_GT(nothing.p, 0.01);
+  EXPECT_EQ(nothing.hypotheses, (*touched)->tried().rows() + nominal->tried().rows());
+  EXPECT_LT(springs.p, 1e-6);
+  EXPECT_EQ(springs.hypotheses, nothing.hypotheses);
+}
+
 TEST(ContactForces, WithTouchesALateSensorIsNoEffectOfBoth) {
   touches::HiddenRig rig;
   rig.hidden = {{"channel_latency", {"latency_us=9000,-4000,-5000"}}};

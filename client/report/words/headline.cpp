@@ -172,6 +172,24 @@ std::string MissingEffects(const v1::Report& report) {
                       Falls(scale, from, to), reached ? ", the noise floor." : ".");
 }
 
+// Of a report without P(nothing is missing); empty: a comparison, a plan, a report of a version that had none.
+std::string WhyNotAssessed(const v1::Report& report) {
+  switch (report.verdict()) {
+    case v1::Report::VERDICT_UNSPECIFIED:
+      return "";
+    case v1::Report::CHECK_DATA:
+      return "a mistake in the data comes first";
+    case v1::Report::TOO_LITTLE_DATA:
+      return "there is too little data";
+    default:
+      break;
+  }
+  if (MainData(report).has_distributions()) return "touches without poses are compared as distributions";
+  for (const v1::DataReport& data : report.data())
+    if (data.kind() == v1::DataReport::PHOTOGRAPHS) return "photographs have no such test";
+  return "";
+}
+
 }  // namespace
 
 bool AgreesToRounding(const v1::DataReport& data) {
@@ -184,7 +202,10 @@ std::string VerdictWord(const v1::Report& report) {
 }
 
 std::string NothingMissingWords(const v1::Report& report) {
-  if (!report.has_p_nothing_missing()) return "";
+  if (!report.has_p_nothing_missing()) {
+    const std::string why = WhyNotAssessed(report);
+    return why.empty() ? "" : absl::StrCat("P(nothing is missing) is not assessed: ", why, ".");
+  }
   const double p = report.p_nothing_missing();
   return absl::StrCat("P(nothing is missing) ", p < 1e-15 ? "" : "= ", Probability(p), " over ",
                       Count(report.hypotheses_tried()), " hypotheses.");

@@ -114,7 +114,7 @@ bool AgreesToRounding(const v1::DataReport& data);
 // "ADEQUATE", as JSON has it; empty for a comparison.
 std::string VerdictWord(const v1::Report& report);
 
-// "P(nothing is missing) = 0.31 over 214 hypotheses."; empty where that was not assessed.
+// "P(nothing is missing) = 0.31 over 214 hypotheses."; why it was not assessed, where a verdict has none; empty for a comparison.
 std::string NothingMissingWords(const v1::Report& report);
 
 // The verdict in one sentence.

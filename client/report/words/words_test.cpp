@@ -95,6 +95,22 @@ TEST(Headline, SaysEveryVerdictInOneSentence) {
             "Measured and simulated touches differ as distributions (p = 0.0005).");
 }
 
+TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
+  v1::Report report = AdequateReport();
+  report.set_p_nothing_missing(0.31);
+  report.set_hypotheses_tried(214);
+  EXPECT_EQ(NothingMissingWords(report), "P(nothing is missing) = 0.31 over 214 hypotheses.");
+  EXPECT_EQ(NothingMissingWords(CheckDataReport()),
+            "P(nothing is missing) is not assessed: a mistake in the data comes first.");
+  EXPECT_EQ(NothingMissingWords(TooLittleDataReport()),
+            "P(nothing is missing) is not assessed: there is too little data.");
+  EXPECT_EQ(NothingMissingWords(CompareReport()), "");
+  report.clear_p_nothing_missing();
+  report.add_data()->set_kind(v1::DataReport::PHOTOGRAPHS);
+  EXPECT_EQ(NothingMissingWords(report),
+            "P(nothing is missing) is not assessed: photographs have no such test.");
+}
+
 // An effect of the catalogue that acts in one round: not "in a way that no built-in effect explains".
 TEST(Headline, SaysThatRoundsDiffer) {
   v1::Report report = UnexplainedReport();

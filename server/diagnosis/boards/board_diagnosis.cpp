@@ -239,6 +239,8 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& all, const model::
     return diagnosis;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<BoardSearch> search, BoardSearch::Make(set, model));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const engine::TriedPValues tried, search->TryAll(seed));
+  diagnosis.nothing_missing = engine::WorstOfAll(tried);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<LensFit> ladder, search->FindNamed());
   TOUCHSTONE_ASSIGN_OR_RETURN(const LensFit fullest, search->FitAll(ladder.back()));
   diagnosis.initial = QualityOf(set, ladder.front(), fullest);

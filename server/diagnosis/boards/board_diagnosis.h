@@ -17,6 +17,7 @@
 #include "server/diagnosis/boards/board_set.h"
 #include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/engine/fit/parameter_estimate.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/uncertainty/budget.h"
 
@@ -52,8 +53,9 @@ struct BoardLens {
 struct BoardDiagnosis {
   engine::Verdict verdict = engine::Verdict::kNone;
   std::string model_name, model_hash;
-  int pictures = 0, corners = 0;                  // that took part; corners of all pictures
-  std::optional<engine::Quality> initial, final;  // none with kTooLittleData
+  int pictures = 0, corners = 0;                          // that took part; corners of all pictures
+  std::optional<engine::Quality> initial, final;          // none with kTooLittleData
+  std::optional<engine::NothingMissing> nothing_missing;  // of the given model; none with kTooLittleData
   engine::NoiseFloor noise;
   std::vector<engine::LadderStep> steps;
   std::vector<engine::ConfoundedEffects> confounded;

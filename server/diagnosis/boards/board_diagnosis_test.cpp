@@ -7,7 +7,9 @@
 
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
+#include "server/diagnosis/boards/board_search.h"
 #include "server/diagnosis/boards/board_test_set.h"
+#include "server/diagnosis/engine/uniform_p_values.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {
@@ -47,6 +49,29 @@ TEST(BoardDiagnosis, ClaimsNothingWhereTheLensIsTheNominalOne) {
     EXPECT_TRUE(!diagnosis.improved_model || !diagnosis.steps.empty());
   }
   EXPECT_EQ(claims, 0);
+}
+
+double POfNothingMissing(const LensVector& lens, uint64_t seed) {
+  const BoardSet set = MakeBoardSet(lens, 8, 0.2, seed);
+  const auto search = BoardSearch::Make(set, model::NominalModel());
+  EXPECT_TRUE(search.ok()) << search.status();
+  const absl::StatusOr<engine::TriedPValues> tried = (*search)->TryAll(seed);
+  EXPECT_TRUE(tried.ok()) << tried.status();
+  return engine::WorstOfAll(*tried).p;
+}
+
+TEST(BoardDiagnosis, HasAUniformPOfNothingMissingUnderTheNominalLens) {
+  TOUCHSTONE_SECOND_TIER("statistical: 500 sets");
+  std::vector<double> p;
+  for (uint64_t set = 0; set < 500; ++set) p.push_back(POfNothingMissing(LensVector::Zero(), 5000 + set));
+  engine::ExpectUniform(p);
+}
+
+TEST(BoardDiagnosis, HasASmallPOfNothingMissingUnderALensThatIsOff) {
+  EXPECT_GT(POfNothingMissing(LensVector::Zero(), 7), 0.01);
+  EXPECT_LT(POfNothingMissing(LensWith({{kFocal, 0.02}}), 7), 0.001);
+  EXPECT_LT(POfNothingMissing(LensWith({{kK1, -0.02}}), 7), 0.001);
+  EXPECT_LT(POfNothingMissing(LensWith({{kP1, 0.003}}), 7), 0.001);  // what has no name counts too
 }
 
 TEST(BoardDiagnosis, NamesEachEffectOfTheProjectionAlone) {

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
 
 namespace touchstone::diagnosis::boards {
@@ -58,6 +59,21 @@ std::optional<double> BoardRows::SquaresOfUnseen(const model::Model& model,
   double sum = 0;
   for (const int picture : unseen) sum += UnseenSquares(set_, lens, picture, nominal_poses_[picture]);
   return sum;
+}
+
+Eigen::MatrixXd BoardRows::WithoutEliminated(Eigen::MatrixXd noise) const {
+  const image::PhotoLens lens = LensOfModel(set_.camera, given_);
+  ProjectedCorner projected;
+  for (int picture = 0; picture < pictures(); ++picture) {
+    const BoardPose pose = FitPose(set_, lens, picture, nominal_poses_[picture]);
+    Eigen::MatrixXd by_pose = Eigen::MatrixXd::Zero(rows_per_picture(), 6);
+    for (int corner = 0; corner < set_.board.corners(); ++corner)
+      if (ProjectCorner(lens, pose, set_.board.CornerM(corner), &projected))
+        by_pose.middleRows<2>(2 * corner) = projected.by_pose;
+    auto own = noise.middleRows(FirstRowOfGroup(picture), rows_per_picture());
+    own -= by_pose * SolveLeastSquaresColumns(by_pose, own);
+  }
+  return noise;
 }
 
 }  // namespace touchstone::diagnosis::boards

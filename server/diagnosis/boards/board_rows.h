@@ -37,7 +37,9 @@ class BoardRows : public engine::ObservationModel {
   std::optional<double> SquaresOfUnseen(const model::Model& model,
                                         const std::vector<int>& rows) const override;
 
-  int EliminatedValues() const { return 6 * pictures(); }
+  int EliminatedValues() const override { return 6 * pictures(); }
+  // Without what a move of each picture's board would do, under the given lens.
+  Eigen::MatrixXd WithoutEliminated(Eigen::MatrixXd noise) const override;
 
  private:
   BoardRows(const BoardSet& set, model::Model given) : set_(set), given_(std::move(given)) {}

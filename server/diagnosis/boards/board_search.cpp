@@ -105,6 +105,24 @@ absl::StatusOr<std::vector<engine::SelectedStep>> BoardSearch::Compete(const Len
   return engine::FindCompetitors(SearchAmong(all_), {lens.fit, 0}, -1, {});
 }
 
+absl::StatusOr<engine::TriedPValues> BoardSearch::TryAll(uint64_t seed) const {
+  const engine::StepwiseSearch search = SearchAmong(all_);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const engine::GivenAndEffects tried,
+                              engine::ColumnsOfEffects(search, model::NominalModel()));
+  engine::LinearHypotheses hypotheses(rows_->EliminatedValues());
+  hypotheses.AddEffects(*rows_, tried.effects);
+  Eigen::MatrixXd together(rows_->rows(), 0);
+  for (const engine::EffectColumns& effect : tried.effects) {
+    together.conservativeResize(Eigen::NoChange, together.cols() + effect.columns.cols());
+    together.rightCols(effect.columns.cols()) = effect.columns;
+  }
+  hypotheses.Add(together);
+  const Eigen::VectorXd residual = tried.given.columns.values.col(0);
+  if (residual.norm() < kFloorPx * std::sqrt(static_cast<double>(rows_->rows())))
+    return engine::AgreeingPValues(hypotheses.size());
+  return hypotheses.PValues(engine::DataAndNoise(*rows_, residual, seed));
+}
+
 double LackOfFitP(const LensFit& less, const LensFit& more) {
   const engine::HeldOutFall fall =
       engine::FallOfHeldOut(less.unseen_px2, more.unseen_px2, kFloorPx * kFloorPx);

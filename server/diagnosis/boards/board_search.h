@@ -9,6 +9,7 @@
 #include "server/diagnosis/boards/board_rows.h"
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/fit/fit.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 
 namespace touchstone::diagnosis::boards {
 
@@ -31,6 +32,8 @@ class BoardSearch {
   absl::StatusOr<LensFit> FitAll(const LensFit& lens) const;
   // What could take the place of each effect of a lens, with a name or without.
   absl::StatusOr<std::vector<engine::SelectedStep>> Compete(const LensFit& lens) const;
+  // Every effect, named or not, and all of them together on the nominal lens. `seed`: of the noise that is drawn.
+  absl::StatusOr<engine::TriedPValues> TryAll(uint64_t seed) const;
 
   // Of what a lens leaves: readings less the values of poses and lens.
   int DegreesOfFreedom(const LensFit& lens) const {

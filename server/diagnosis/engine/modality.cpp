@@ -21,4 +21,10 @@ absl::StatusOr<HeldOutError> Modality::HeldOut(const Fit& /*searched*/, const Fi
   return error;
 }
 
+std::optional<NothingMissing> NothingMissingOf(const std::vector<const Modality*>& modalities) {
+  std::vector<const TriedPValues*> kinds;
+  for (const Modality* modality : modalities) kinds.push_back(&modality->tried());
+  return WorstOfKinds(kinds);
+}
+
 }  // namespace touchstone::diagnosis::engine

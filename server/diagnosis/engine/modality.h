@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
@@ -52,6 +54,9 @@ class Modality {
   // What that search says of an effect that it added; null: it added no such effect, or says nothing of single ones.
   virtual const SelectedStep* FoundAlone(const std::string& /*effect*/) const { return nullptr; }
 
+  // Of the given model, over every effect, curve and kind of noise that was tried on these measurements.
+  virtual const TriedPValues& tried() const = 0;
+
   // The rows that values are taken from, near a fit. Default: those of the search.
   virtual absl::StatusOr<FinalRows> RowsNear(const Fit& /*fit*/) const {
     return FinalRows{experiment(), nullptr};
@@ -67,5 +72,8 @@ class Modality {
   // Of a fit to the search's rows, and the same effects fitted to RowsNear it.
   virtual absl::StatusOr<HeldOutError> HeldOut(const Fit& searched, const Fit& final) const;
 };
+
+// Over all that was tried on any of them; none: one of them cannot say.
+std::optional<NothingMissing> NothingMissingOf(const std::vector<const Modality*>& modalities);
 
 }  // namespace touchstone::diagnosis::engine

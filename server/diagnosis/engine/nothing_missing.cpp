@@ -5,8 +5,26 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/distributions.h"
+#include "server/base/numbers/random.h"
 
 namespace touchstone::diagnosis::engine {
+namespace {
+
+// Kinds draw from one seed: a draw of one goes with a draw of another index of the next.
+constexpr int kDrawsApart = 37;
+
+// A value per group.
+Eigen::MatrixXd OnEachGroup(const ObservationModel& rows, const Eigen::MatrixXd& columns) {
+  const int groups = static_cast<int>(rows.groups().size());
+  Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(columns.rows(), groups * columns.cols());
+  for (int group = 0; group < groups; ++group) {
+    const int first = rows.FirstRowOfGroup(group), count = rows.FirstRowOfGroup(group + 1) - first;
+    apart.block(first, group * columns.cols(), count, columns.cols()) = columns.middleRows(first, count);
+  }
+  return apart;
+}
+
+}  // namespace
 
 void LinearHypotheses::Add(const Eigen::MatrixXd& columns, int first_row) {
   if (columns.cols() == 0 || !columns.allFinite()) return;
@@ -19,6 +37,29 @@ void LinearHypotheses::Add(const Eigen::MatrixXd& columns, int first_row) {
   bases_.push_back({span.Basis(), first_row});
 }
 
+void LinearHypotheses::AddRows(int first_row, int rows) {
+  bases_.push_back({Eigen::MatrixXd::Identity(rows, rows), first_row});
+}
+
+void LinearHypotheses::AddEffects(const ObservationModel& rows, const std::vector<EffectColumns>& effects) {
+  for (const EffectColumns& effect : effects) {
+    if (effect.shared < 0) {
+      Add(effect.columns);
+      continue;
+    }
+    const Eigen::MatrixXd& columns = effects[effect.shared].columns;
+    if (effect.extension.object.empty()) {
+      Add(OnEachGroup(rows, columns));
+      continue;
+    }
+    const std::vector<std::string>& groups = rows.groups();
+    const int group =
+        static_cast<int>(std::find(groups.begin(), groups.end(), effect.extension.object) - groups.begin());
+    const int first = rows.FirstRowOfGroup(group);
+    Add(columns.middleRows(first, rows.FirstRowOfGroup(group + 1) - first), first);
+  }
+}
+
 Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) const {
   Eigen::MatrixXd p_values(size(), residuals.cols());
   const Eigen::RowVectorXd all = residuals.colwise().squaredNorm();
@@ -29,12 +70,24 @@ Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) cons
             .colwise()
             .squaredNorm();
     const double rank = static_cast<double>(basis.columns.cols());
-    const double left = static_cast<double>(residuals.rows()) - rank;
+    const double left = static_cast<double>(residuals.rows()) - eliminated_ - rank;
     for (int draw = 0; draw < residuals.cols(); ++draw)
       p_values(h, draw) =
           FisherTail(taken[draw] / rank / std::max((all[draw] - taken[draw]) / left, 1e-300), rank, left);
   }
   return p_values;
+}
+
+Eigen::MatrixXd DataAndNoise(const ObservationModel& rows, const Eigen::VectorXd& residual, uint64_t seed,
+                             int draws) {
+  Eigen::MatrixXd columns(residual.size(), 1 + draws);
+  columns.col(0) = residual;
+  for (int draw = 1; draw <= draws; ++draw) {
+    RandomStream random(seed, RandomDomain::kDiagnosis, draw);
+    for (int row = 0; row < residual.size(); ++row) columns(row, draw) = random.Normal();
+  }
+  columns.rightCols(draws) = rows.WithoutEliminated(columns.rightCols(draws));
+  return columns;
 }
 
 Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics) {
@@ -50,7 +103,17 @@ Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics) {
   return p_values;
 }
 
-NothingMissing WorstOfAll(const Eigen::MatrixXd& p_values) {
+TriedPValues AgreeingPValues(int hypotheses) {
+  return TriedPValues::Ones(hypotheses, 1 + kNoiseDraws);
+}
+
+TriedPValues ImpossiblePValues(int hypotheses) {
+  TriedPValues p_values = AgreeingPValues(hypotheses);
+  p_values.col(0).setZero();
+  return p_values;
+}
+
+NothingMissing WorstOfAll(const TriedPValues& p_values) {
   NothingMissing worst;
   worst.hypotheses = static_cast<int>(p_values.rows());
   if (worst.hypotheses == 0 || p_values.cols() < 2) return worst;
@@ -60,6 +123,28 @@ NothingMissing WorstOfAll(const Eigen::MatrixXd& p_values) {
   // Beyond all draws: what each hypothesis by itself allows, paid for all of them.
   if (as_bad == 0) worst.p = std::min(worst.p, worst.hypotheses * least[0]);
   return worst;
+}
+
+std::optional<NothingMissing> WorstOfKinds(const std::vector<const TriedPValues*>& kinds) {
+  if (kinds.empty()) return std::nullopt;
+  Eigen::Index hypotheses = 0, draws = kinds[0]->cols() - 1;
+  for (const TriedPValues* kind : kinds) {
+    if (kind->rows() == 0 || kind->cols() < 2) return std::nullopt;
+    hypotheses += kind->rows();
+    draws = std::min(draws, kind->cols() - 1);
+  }
+  TriedPValues all(hypotheses, 1 + draws);
+  Eigen::Index first = 0;
+  for (size_t k = 0; k < kinds.size(); ++k) {
+    const TriedPValues& own = *kinds[k];
+    auto part = all.middleRows(first, own.rows());
+    part.col(0) = own.col(0);
+    for (Eigen::Index draw = 0; draw < draws; ++draw)
+      part.col(1 + draw) =
+          own.col(1 + (draw + static_cast<Eigen::Index>(k) * kDrawsApart) % (own.cols() - 1));
+    first += own.rows();
+  }
+  return WorstOfAll(all);
 }
 
 }  // namespace touchstone::diagnosis::engine

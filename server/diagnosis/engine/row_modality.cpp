@@ -23,6 +23,12 @@ absl::StatusOr<std::unique_ptr<RowModality>> RowModality::Make(Description descr
                               search.Run(Parameterization(made->given(), made->objects()),
                                          static_cast<int>(made->given().effects.size())));
   made->alone_ = std::move(explanation.fit);
+  TOUCHSTONE_ASSIGN_OR_RETURN(const GivenAndEffects columns, ColumnsOfEffects(search, made->given()));
+  const ObservationModel& rows = *made->description_.rows;
+  LinearHypotheses hypotheses(rows.EliminatedValues());
+  hypotheses.AddEffects(rows, columns.effects);
+  made->tried_ =
+      hypotheses.PValues(DataAndNoise(rows, columns.given.columns.values.col(0), made->description_.seed));
   return made;
 }
 

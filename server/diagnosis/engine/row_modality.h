@@ -1,6 +1,7 @@
 // A kind of measurement that is nothing but rows: what a kind of your own begins with.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -23,6 +24,7 @@ class RowModality : public Modality {
     std::vector<Candidate> candidates;  // that `given` lacks
     std::function<bool(const model::Effect&)> sees;
     ThreadPool* pool = nullptr;  // null: this thread alone
+    uint64_t seed = 0;           // of what is drawn
   };
 
   // Searches for what these rows alone are explained by. Errors as FitModel.
@@ -35,6 +37,7 @@ class RowModality : public Modality {
   const Experiment& experiment() const override { return experiment_; }
   const std::vector<Candidate>& candidates() const override { return description_.candidates; }
   const Fit& alone() const override { return alone_; }
+  const TriedPValues& tried() const override { return tried_; }
   // The lack of fit is judged by the known noise (chi-square).
   absl::StatusOr<Quality> Compare(const model::Model& model) const override;
 
@@ -45,6 +48,7 @@ class RowModality : public Modality {
   std::unique_ptr<Likelihood> likelihood_;
   Experiment experiment_;
   Fit alone_;
+  TriedPValues tried_;
 };
 
 }  // namespace touchstone::diagnosis::engine

@@ -23,6 +23,12 @@ int SetAside::count() const {
   return sum;
 }
 
+void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagnosis* diagnosis) {
+  diagnosis->p_nothing_missing.reset();
+  diagnosis->hypotheses_tried = found ? found->hypotheses : 0;
+  if (found) diagnosis->p_nothing_missing = found->p;
+}
+
 double ReducibleShare(const NoiseFloor& floor, double rmse) {
   return rmse > 0 ? std::clamp(1 - floor.sigma * floor.sigma / (rmse * rmse), 0.0, 1.0) : 0;
 }

@@ -14,6 +14,7 @@
 #include "server/diagnosis/engine/competition/detectability.h"
 #include "server/diagnosis/engine/competition/effect_explanation.h"
 #include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/joint/session_changes.h"
 #include "server/diagnosis/residuals/slices/model_comparison.h"
@@ -205,6 +206,9 @@ struct Diagnosis {
   std::vector<std::string> warnings;  // what limits all this
   double duration_s = 0;
 };
+
+// None: not assessed.
+void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagnosis* diagnosis);
 
 // The share of a squared error that is the model's, not noise: 0 to 1.
 double ReducibleShare(const NoiseFloor& floor, double rmse);

@@ -196,6 +196,7 @@ Diagnosis SideBySide(Diagnosis touches, Diagnosis photographs) {
   Diagnosis both = std::move(touches);
   // One of touches alone is none of a model that photographs have a part in.
   both.posterior.reset();
+  SetNothingMissing(std::nullopt, &both);
   both.uncertainty.clear();
   both.verdict = WorseOf(both.verdict, photographs.verdict);
   both.model_name = photographs.model_name;
@@ -218,6 +219,7 @@ Diagnosis Join(JointParts parts) {
   both.model_name = parts.model_name;
   both.model_hash = parts.model_hash;
   both.verdict = VerdictOf(parts);
+  SetNothingMissing(parts.nothing_missing, &both);
   both.steps.clear();
   for (DataReport& data : both.data) {
     data.after_step.clear();

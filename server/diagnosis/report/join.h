@@ -1,6 +1,8 @@
 // One diagnosis of touches and photographs of one session.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "server/diagnosis/joint/shared_effects.h"
@@ -24,7 +26,9 @@ struct JointParts {
   std::vector<JointQuality> shared_quality;  // after each shared step, as comparisons find it
   Diagnosis touches, photographs;            // with the shared effects in place
   JointQuality initial;                      // of the given model
-  std::string model_name, model_hash;        // its
+  std::optional<engine::NothingMissing>
+      nothing_missing;                 // likewise, over what was tried on both; none: not assessed
+  std::string model_name, model_hash;  // its
 };
 
 // All but the improved model: what both show together, then what each kind shows beside that.

@@ -156,6 +156,18 @@ class Competition {
                         ".");
   }
 
+  // Whether the effects are worth more with a curve beside them than a curve in their place is, whose evidence is
+  // `without_nats`. The mean and trend of a course are constants and drifts of fingers.
+  bool StandsBeside(const std::vector<int>& steps, const engine::Fit& named,
+                    const std::vector<NamelessCurve>& beside, double without_nats) const {
+    if (beside.empty()) return false;
+    const bool per_finger = std::any_of(steps.begin(), steps.end(), [&](int index) {
+      return IsPerFinger(*named.model.base().effects[index].effect);
+    });
+    const double with_nats = named.log_evidence + std::max(0.0, beside[0].gain_nats);
+    return with_nats - without_nats > (per_finger ? kBeyondCorrelatedNats : kSimplerNats);
+  }
+
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
   absl::StatusOr<bool> Overtake(const std::vector<int>& steps, engine::Fit* named) {
     engine::Parameterization rest = named->model;
@@ -178,14 +190,13 @@ class Competition {
                               OneFingerNats(*named->model.base().effects[steps[0]].effect, curves[0]));
     const double behind = without.log_evidence - own;
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<NamelessCurve> beside, CurvesOver(*named, covariate));
-    // What the curve says beside the effects as well is no rival of theirs.
-    const double any_beside = beside.empty() ? 0 : std::max(0.0, beside[0].any_gain_nats);
+    const bool stands = StandsBeside(steps, *named, beside, without.log_evidence + curves[0].gain_nats);
+    // What a curve says beside the effects as well is no rival of theirs.
+    const double any_beside = stands && !beside.empty() ? std::max(0.0, beside[0].any_gain_nats) : 0;
     for (const std::string& name : names)
       NoteRival(name, behind + curves[0].any_gain_nats - any_beside, RivalInWords(curves[0]));
     if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteCorrelatedNoise(steps[0], *named, without));
-    if (!IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
-    const double with_both = named->log_evidence + (beside.empty() ? 0 : std::max(0.0, beside[0].gain_nats));
-    if (without.log_evidence + curves[0].gain_nats < with_both - kSimplerNats) return false;
+    if (stands || !IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
     return true;

@@ -46,7 +46,8 @@ struct Difference {
 
 class DifferenceSearch {
  public:
-  DifferenceSearch(const Workspace& workspace, const GivenAndEffects& columns, const SelectionResult& found)
+  DifferenceSearch(const Workspace& workspace, const engine::GivenAndEffects& columns,
+                   const SelectionResult& found)
       : workspace_(workspace),
         columns_(columns),
         found_(found),
@@ -123,7 +124,7 @@ class DifferenceSearch {
     return nats;
   }
 
-  bool IsTried(const EffectColumns& effect) const {
+  bool IsTried(const engine::EffectColumns& effect) const {
     return effect.shared < 0 && effect.extension.object.empty() && !effect.extension.nameless &&
            effect.columns.cols() > 0;
   }
@@ -244,7 +245,7 @@ class DifferenceSearch {
     Eigen::VectorXd left;            // residuals, centred
   };
   absl::StatusOr<Fitted> FitIn(const Difference& d) const {
-    const EffectColumns& effect = columns_.effects[d.effect];
+    const engine::EffectColumns& effect = columns_.effects[d.effect];
     Fitted fitted{effect.extension.start, SolutionOf(d), ColumnsOf(d), {}};
     fitted.left = residuals_ - fitted.columns * fitted.more;
     if (effect.extension.candidate < 0) return fitted;
@@ -330,7 +331,7 @@ class DifferenceSearch {
   }
 
   const Workspace& workspace_;
-  const GivenAndEffects& columns_;
+  const engine::GivenAndEffects& columns_;
   const SelectionResult& found_;
   const Repeats repeats_;
   std::vector<SessionPart> parts_;
@@ -343,7 +344,7 @@ class DifferenceSearch {
 }  // namespace
 
 absl::StatusOr<std::optional<GroupDifference>> FindGroupDifference(const Workspace& workspace,
-                                                                   const GivenAndEffects& columns,
+                                                                   const engine::GivenAndEffects& columns,
                                                                    const SelectionResult& found) {
   return DifferenceSearch(workspace, columns, found).Run();
 }

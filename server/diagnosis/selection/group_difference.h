@@ -8,7 +8,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/selection/effect_columns.h"
+#include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/selection/selection.h"
 
 namespace touchstone::diagnosis::selection {
@@ -17,7 +17,7 @@ namespace touchstone::diagnosis::selection {
 // takes no part. `found`: the explanation without such a difference, which may explain as much (a drift, a curve of time,
 // correlated noise); nothing where it does, where repeats are few, and where the object lay elsewhere in every round.
 absl::StatusOr<std::optional<GroupDifference>> FindGroupDifference(const Workspace& workspace,
-                                                                   const GivenAndEffects& columns,
+                                                                   const engine::GivenAndEffects& columns,
                                                                    const SelectionResult& found);
 
 }  // namespace touchstone::diagnosis::selection

@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
-#include "server/diagnosis/selection/effect_columns.h"
 #include "server/diagnosis/selection/group_difference.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
@@ -210,7 +210,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   const auto progress = [workspace](const std::string& what) {
     if (workspace->context.progress) workspace->context.progress(what, 0);
   };
-  engine::NothingMissing nothing_missing;
+  engine::TriedPValues tried;
   std::optional<GroupDifference> group;
   std::optional<engine::Parameterization> before;
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -219,10 +219,10 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     result.search = std::make_unique<engine::StepwiseSearch>(
         workspace->experiment, MakeCandidates(workspace->input, *workspace->searched), engine::SearchRules(),
         progress);
-    GivenAndEffects columns;
+    engine::GivenAndEffects columns;
     if (pass == 0) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(columns, ColumnsOfEffects(*workspace, *result.search));
-      TOUCHSTONE_ASSIGN_OR_RETURN(nothing_missing, TestNothingMissing(*workspace, columns));
+      TOUCHSTONE_ASSIGN_OR_RETURN(columns, engine::ColumnsOfEffects(*result.search, *workspace->input.model));
+      TOUCHSTONE_ASSIGN_OR_RETURN(tried, TryOnTouches(*workspace, columns));
     }
     TOUCHSTONE_RETURN_IF_ERROR(FindCauses(*workspace, before, &result));
     if (pass == 0) {
@@ -239,7 +239,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     if (!revised) break;
     before = result.without_formula.model;
   }
-  result.nothing_missing = nothing_missing;
+  result.tried = std::move(tried);
   result.group = std::move(group);
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
   TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));

@@ -53,7 +53,7 @@ struct SelectionResult {
   std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
   std::map<std::string, engine::NamelessRival> curve_rivals;  // by the effect whose place they would take
   std::vector<engine::SelectedStep> steps;
-  engine::NothingMissing nothing_missing;  // of the model as it was given, over all that is tried
+  engine::TriedPValues tried;  // of the model as it was given, over all that is tried
   touches::NoiseFindings noise;
   std::optional<NoiseMemory>
       memory;  // the correlated noise that the residuals follow, where no curve describes them better

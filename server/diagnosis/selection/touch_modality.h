@@ -30,6 +30,7 @@ class TouchModality : public engine::Modality {
   const engine::Experiment& experiment() const override { return workspace_->experiment; }
   const std::vector<engine::Candidate>& candidates() const override { return found_.search->candidates(); }
   const engine::Fit& alone() const override { return found_.fit; }
+  const engine::TriedPValues& tried() const override { return found_.tried; }
   const engine::SelectedStep* FoundAlone(const std::string& effect) const override;
   // Every touch, those that the search left out marked, as it was at the end of the search.
   const Workspace& workspace() const { return *workspace_; }

@@ -15,7 +15,7 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kDraws = 199, kSimulatedDraws = 99;
+constexpr int kSimulatedDraws = 99;
 constexpr int kCurveDegree = 3;
 
 // Whether the model says more of the noise than that it is normal and the same for all.
@@ -38,15 +38,15 @@ model::Model WithoutDropouts(model::Model model) {
 
 class Tester {
  public:
-  Tester(const Workspace& workspace, const GivenAndEffects& columns)
+  Tester(const Workspace& workspace, const engine::GivenAndEffects& columns)
       : workspace_(workspace),
         given_(columns.given),
         effects_(columns.effects),
         o_(*workspace.searched),
         contrasts_(*workspace.contrasts) {}
 
-  absl::StatusOr<engine::NothingMissing> Run() {
-    AddEffects();
+  absl::StatusOr<engine::TriedPValues> Run() {
+    hypotheses_.AddEffects(*workspace_.rows, effects_);
     TOUCHSTONE_ASSIGN_OR_RETURN(details_,
                                 workspace_.searched_predictor->Run(*workspace_.input.model, true, true));
     AddCurves();
@@ -54,52 +54,22 @@ class Tester {
     // What is left is less than numbers are rounded to: it has no noise, and its pattern is that of rounding.
     const double rms_s =
         std::sqrt(given_.columns.values.col(0).squaredNorm() / std::max(contrasts_.rows(), 1));
-    if (rms_s < RoundingS(o_)) return engine::NothingMissing{1, hypotheses_.size()};
+    if (rms_s < RoundingS(o_)) return engine::AgreeingPValues(hypotheses_.size());
     // Data of a model without any noise agree to rounding: these do not.
     const auto& given = workspace_.input.model->effects;
     if (std::none_of(given.begin(), given.end(),
                      [](const model::EffectInstance& instance) { return instance.effect->random(); }))
-      return engine::NothingMissing{0, hypotheses_.size()};
+      return engine::ImpossiblePValues(hypotheses_.size());
     const Eigen::MatrixXd linear = hypotheses_.PValues(residuals);
     const Eigen::MatrixXd others = engine::PValuesOfStatistics(Statistics(residuals));
     Eigen::RowVectorXd ticks = Eigen::RowVectorXd::Ones(residuals.cols());
     ticks[0] = TicksP();
-    Eigen::MatrixXd p_values(linear.rows() + others.rows() + 1, residuals.cols());
+    engine::TriedPValues p_values(linear.rows() + others.rows() + 1, residuals.cols());
     p_values << linear, others, ticks;
-    return engine::WorstOfAll(p_values);
+    return p_values;
   }
 
  private:
-  void AddEffects() {
-    for (const EffectColumns& effect : effects_) {
-      if (effect.shared < 0) {
-        hypotheses_.Add(effect.columns);
-        continue;
-      }
-      const Eigen::MatrixXd& columns = effects_[effect.shared].columns;
-      if (effect.extension.object.empty()) {
-        hypotheses_.Add(OnEachObject(columns));
-        continue;
-      }
-      const int object = static_cast<int>(
-          std::find(o_.objects.begin(), o_.objects.end(), effect.extension.object) - o_.objects.begin());
-      const int first = contrasts_.FirstRowOfObject(object);
-      hypotheses_.Add(columns.middleRows(first, contrasts_.FirstRowOfObject(object + 1) - first), first);
-    }
-  }
-
-  // A value per object.
-  Eigen::MatrixXd OnEachObject(const Eigen::MatrixXd& columns) const {
-    const int objects = static_cast<int>(o_.objects.size());
-    Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(columns.rows(), objects * columns.cols());
-    for (int object = 0; object < objects; ++object) {
-      const int first = contrasts_.FirstRowOfObject(object);
-      const int rows = contrasts_.FirstRowOfObject(object + 1) - first;
-      apart.block(first, object * columns.cols(), rows, columns.cols()) = columns.middleRows(first, rows);
-    }
-    return apart;
-  }
-
   // Polynomials of one covariate, of each finger by itself: travel that a curve adds.
   void AddCurves() {
     for (const CurveCovariate& covariate : ListCurveCovariates(o_, details_)) {
@@ -135,17 +105,13 @@ class Tester {
 
   // The residual of the data, then of draws from the given model; columns.
   absl::StatusOr<Eigen::MatrixXd> DataAndDraws() const {
-    const bool shaped = HasShapedNoise(*workspace_.input.model);
-    const int draws = shaped ? kSimulatedDraws : kDraws;
-    Eigen::MatrixXd residuals(contrasts_.rows(), 1 + draws);
-    residuals.col(0) = given_.columns.values.col(0);
+    const Eigen::VectorXd data = given_.columns.values.col(0);
+    if (!HasShapedNoise(*workspace_.input.model))
+      return engine::DataAndNoise(*workspace_.rows, data, workspace_.input.seed);
+    Eigen::MatrixXd residuals(contrasts_.rows(), 1 + kSimulatedDraws);
+    residuals.col(0) = data;
     const model::Model drawn_from = WithoutDropouts(*workspace_.input.model);
-    for (int draw = 1; draw <= draws; ++draw) {
-      if (!shaped) {
-        RandomStream random(workspace_.input.seed, RandomDomain::kDiagnosis, draw);
-        for (int row = 0; row < contrasts_.rows(); ++row) residuals(row, draw) = random.Normal();
-        continue;
-      }
+    for (int draw = 1; draw <= kSimulatedDraws; ++draw) {
       TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> noise_s,
                                   workspace_.searched_predictor->Draw(drawn_from, draw));
       for (size_t e = 0; e < noise_s.size(); ++e) {
@@ -219,7 +185,7 @@ class Tester {
 
   const Workspace& workspace_;
   const engine::Fit& given_;
-  const std::vector<EffectColumns>& effects_;
+  const std::vector<engine::EffectColumns>& effects_;
   const touches::Observations& o_;
   const touches::Contrasts& contrasts_;
   touches::Prediction details_;
@@ -228,8 +194,8 @@ class Tester {
 
 }  // namespace
 
-absl::StatusOr<engine::NothingMissing> TestNothingMissing(const Workspace& workspace,
-                                                          const GivenAndEffects& columns) {
+absl::StatusOr<engine::TriedPValues> TryOnTouches(const Workspace& workspace,
+                                                  const engine::GivenAndEffects& columns) {
   return Tester(workspace, columns).Run();
 }
 

@@ -75,6 +75,10 @@ class ObservationModel {
   virtual std::optional<double> SquaresOfUnseen(const model::Model&, const std::vector<int>&) const {
     return std::nullopt;
   }
+  // Degrees of freedom that values of their own take from the rows: every prediction fits them (the pose of each picture).
+  virtual int EliminatedValues() const { return 0; }
+  // Columns of noise as such fits leave it.
+  virtual Eigen::MatrixXd WithoutEliminated(Eigen::MatrixXd noise) const { return noise; }
   // How far a value moves for a derivative, over its parameter's scale.
   virtual double DerivativeStep() const { return 0.02; }
   // Whether derivatives by this effect hold only near where the rows were made, and are known roughly even there: what is

@@ -67,6 +67,7 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
     diagnosis.steps.push_back(std::move(step));
     diagnosis.data[0].after_step.push_back(from.quality);
   }
+  SetNothingMissing(found.nothing_missing, &diagnosis);
   diagnosis.confounded = found.confounded;
   diagnosis.improved_model = found.improved_model;
   diagnosis.uncertainty = found.uncertainty;

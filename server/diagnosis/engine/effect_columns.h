@@ -9,10 +9,10 @@
 #include "server/diagnosis/engine/search/stepwise_search.h"
 #include "server/diagnosis/selection/workspace.h"
 
-namespace touchstone::diagnosis::selection {
+namespace touchstone::diagnosis::engine {
 
 struct EffectColumns {
-  engine::Extension extension;
+  Extension extension;
   Eigen::MatrixXd
       columns;  // rows x its values: derivatives of the predicted rows; empty where `shared` is not -1
   // Of an effect that acts on objects one by one: where the same effect on all of them stands, which has its columns.
@@ -21,12 +21,11 @@ struct EffectColumns {
 
 // The given model, and every way to extend it that a search tries.
 struct GivenAndEffects {
-  engine::Fit given;
+  Fit given;
   std::vector<EffectColumns> effects;
 };
 
-// On the touches of the search.
-absl::StatusOr<GivenAndEffects> ColumnsOfEffects(const Workspace& workspace,
-                                                 const engine::StepwiseSearch& search);
+// On the rows of the search. Errors as FitModel.
+absl::StatusOr<GivenAndEffects> ColumnsOfEffects(const StepwiseSearch& search, const model::Model& given);
 
-}  // namespace touchstone::diagnosis::selection
+}  // namespace touchstone::diagnosis::engine
