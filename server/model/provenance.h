@@ -24,7 +24,7 @@ struct Promotion {
   UsedSet on;
   double lower = 0, upper = 0;  // 95 % interval of the difference of the errors, after less before
   std::string before;           // the text of the model file that this one took the place of, whole
-  std::string hash;  // of the model that was promoted: another one was changed since; empty: unknown
+  std::string hash = {};  // of the model that was promoted: another one was changed since; empty: unknown
 };
 
 struct Provenance {

@@ -44,7 +44,9 @@ TEST_F(PhotoRowsTest, SimulateOnlyPhotographsWithARowThatIsRead) {
   for (int row = 0; row < rows->rows(); ++row) {
     const bool read = rows->PhotographOfRow(row) % 2 == 0;
     EXPECT_EQ(some[row], read ? all[row] : 0) << row;
-    if (read) EXPECT_EQ(some_near[row], near[row]) << row;
+    if (read) {
+      EXPECT_EQ(some_near[row], near[row]) << row;
+    }
     EXPECT_NE(all[row], 0) << row;
   }
 }
