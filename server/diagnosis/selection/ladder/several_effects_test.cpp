@@ -21,29 +21,40 @@ std::string NameAmong(const std::vector<std::string>& hidden, const engine::Ladd
   return step.effect;
 }
 
-// Every hidden effect is a step, nothing else is, and the error falls with each.
-void ExpectAllFound(const touches::HiddenRig& rig) {
+Ladder LadderFor(const touches::HiddenRig& rig) {
   Selected selected = SelectFor(touches::MakeTestInput(rig));
-  const auto ladder = BuildLadder(*selected.workspace, &selected.result);
-  ASSERT_TRUE(ladder.ok()) << ladder.status();
-  EXPECT_EQ(ladder->verdict, engine::Verdict::kMissingEffects);
+  absl::StatusOr<Ladder> ladder = BuildLadder(*selected.workspace, &selected.result);
+  EXPECT_TRUE(ladder.ok()) << ladder.status();
+  return *std::move(ladder);
+}
+
+// Every hidden effect of the means is a step, no other of the means is, and the error falls with each.
+void ExpectMeansFound(const touches::HiddenRig& rig, const Ladder& ladder) {
   std::vector<std::string> hidden, found;
-  for (const auto& [effect, values] : rig.hidden) hidden.push_back(effect);
+  for (const auto& [effect, values] : rig.hidden)
+    if (!effects::Catalogue().Find(effect)->random()) hidden.push_back(effect);
   double last = INFINITY;
-  for (const engine::LadderStep& step : ladder->steps) {
-    found.push_back(NameAmong(hidden, step));
+  for (const engine::LadderStep& step : ladder.steps) {
     if (effects::Catalogue().Find(step.effect)->random()) continue;
+    found.push_back(NameAmong(hidden, step));
     EXPECT_LT(step.quality.rmse, last) << step.effect;
     last = step.quality.rmse;
   }
   EXPECT_THAT(found, UnorderedElementsAreArray(hidden));
 }
 
+void ExpectAllFound(const touches::HiddenRig& rig) {
+  const Ladder ladder = LadderFor(rig);
+  EXPECT_EQ(ladder.verdict, engine::Verdict::kMissingEffects);
+  ExpectMeansFound(rig, ladder);
+}
+
 // A size that is 2.6 % off makes up for fingers that stand too close and a speed that is too low: either of these, beside it,
 // leaves the error as it is.
 TEST(SeveralEffects, StepsThatNeedEachOtherAreBothFound) {
+  TOUCHSTONE_SECOND_TIER("long: a search for five effects");
   touches::HiddenRig rig;
-  rig.samples_per_face = 8;
+  rig.samples_per_face = 6;
   rig.rounds = 2;
   rig.hidden = {{"finger_spacing", {"delta_mm=-0.65"}},
                 {"finger_length", {"offset_mm=-0.245,0.202,0.043"}},
@@ -83,7 +94,7 @@ TEST(SeveralEffects, CorrelatedNoiseReplacesNoEffectOfThePose) {
                 {"object_scale", {"relative=-0.019"}},
                 {"oblique_slip", {"travel_mm=0.52"}},
                 {"correlated_noise", {"sigma_us=5183", "time_s=305"}}};
-  ExpectAllFound(rig);
+  ExpectMeansFound(rig, LadderFor(rig));
 }
 
 }  // namespace
