@@ -32,6 +32,8 @@ constexpr Row kRows[] = {
     {"one", kCopyCovers, Is::kBetween, 0.92, 0.98},
     {"two", "all found, none added", Is::kAtLeast, 0.90, 0},
     {"three", "all found, none added", Is::kAtLeast, 0.90, 0},
+    {"five", "all found, none added", Is::kAtLeast, 0.90, 0},
+    {"five, two speeds", "all found, none added", Is::kAtLeast, 0.90, 0},
     {"latency or length, one speed", "said so, with what decides", Is::kAtLeast, 1, 0},
     {"latency or length, two speeds", "right first", Is::kAtLeast, 1, 0},
     {"stretched time", "said so, with what decides", Is::kAtLeast, 1, 0},

@@ -234,6 +234,17 @@ std::vector<Arm> MakeArms() {
                       return scenario;
                     },
                     {}});
+  arms.push_back(
+      {"five", Kind::kEffects, 40, [](W w, uint64_t s) { return Realistic(FullSet(w), s, 5); }, {}});
+  arms.push_back({"five, two speeds",
+                  Kind::kEffects,
+                  40,
+                  [](W w, uint64_t s) {
+                    Scenario scenario = FullSet(w);
+                    scenario.speeds_mm_s = {kSpeed, 50}, scenario.speed_by_round = true;
+                    return Realistic(scenario, s, 5);
+                  },
+                  {}});
   return arms;
 }
 
