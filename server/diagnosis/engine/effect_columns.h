@@ -7,7 +7,6 @@
 #include <Eigen/Core>
 
 #include "server/diagnosis/engine/search/stepwise_search.h"
-#include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis::engine {
 

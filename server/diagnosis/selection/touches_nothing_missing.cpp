@@ -5,7 +5,6 @@
 #include <map>
 #include <numeric>
 
-#include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
