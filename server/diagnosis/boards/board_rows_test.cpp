@@ -1,9 +1,11 @@
 #include "server/diagnosis/boards/board_rows.h"
 
+#include <cmath>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
+#include "server/base/numbers/random.h"
 #include "server/diagnosis/boards/board_test_set.h"
 #include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/engine/fit/held_out.h"
@@ -37,6 +39,19 @@ struct Engine {
   std::unique_ptr<engine::Likelihood> likelihood;
   engine::Experiment experiment;
 };
+
+// What a fit of each picture's pose leaves of noise: six directions a picture less, and of what it has left already, all.
+TEST(BoardRows, TakeTheMovesOfEachBoardOutOfNoise) {
+  const BoardSet set = MakeBoardSet(LensVector::Zero(), 6, 0.2, 1);
+  const Engine engine(set);
+  const Eigen::VectorXd left = engine.ResidualAt(model::NominalModel());
+  EXPECT_LT((engine.rows->WithoutEliminated(left) - left).norm(), 1e-3 * left.norm());
+  Eigen::MatrixXd noise(engine.rows->rows(), 50);
+  RandomStream random(2, RandomDomain::kTest);
+  for (double& value : noise.reshaped()) value = random.Normal();
+  const double expected = 50.0 * (engine.rows->rows() - engine.rows->EliminatedValues());
+  EXPECT_NEAR(engine.rows->WithoutEliminated(noise).squaredNorm(), expected, 4 * std::sqrt(2 * expected));
+}
 
 TEST(BoardRows, AreZeroAtTheLensThatMadeTheSet) {
   const BoardSet set = MakeBoardSet(kLens, 6, 0, 1);

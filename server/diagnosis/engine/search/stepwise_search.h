@@ -132,7 +132,7 @@ class StepwiseSearch {
                                                       std::vector<Extension> extensions) const;
   // One that lets the error on rows fall that it did not see, of `likely`, or else of what may follow the best of them.
   absl::StatusOr<bool> AddOne(std::vector<Tried> likely, Explanation* explanation) const;
-  // Two of which neither explains enough by itself: what one adds, the other takes away where they are fitted to.
+  // Two of which neither explains enough by itself.
   absl::StatusOr<bool> AddTwo(const std::vector<Extension>& extensions,
                               const std::vector<PairOfExtensions>& pairs, Explanation* explanation) const;
   // `model` with what the extension frees or adds, where it changes nothing.
