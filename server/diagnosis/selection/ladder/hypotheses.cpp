@@ -34,6 +34,7 @@ const std::vector<HypothesisRule>& HypothesisRules() {
        {Q::kSurface, Q::kPoseScatter, Q::kNoise, Q::kUnevenScatter, Q::kAbsentMemory}},
       {H::kStrangeValues, "strange values", L::kDoubts, {Q::kSurface}},
       {H::kUnevenScatter, "uneven scatter", L::kScatter, {}},
+      {H::kRandomDelay, "random delay", L::kScatter, {}},
       {H::kLopsided, "lopsided scatter", L::kScatter, {}},
       {H::kSetAside, "set aside", L::kMeans, {}},
       {H::kTicks, "ticks", L::kMeans, {}},

@@ -22,6 +22,7 @@ enum class Hypothesis {
   kRemounted,        // the object lies elsewhere in every round (round_structure.h)
   kStrangeValues,    // values at their bounds, many of sizes that no rig shows (doubts.h)
   kUnevenScatter,    // the noise differs between parts of the set (uneven_scatter.h)
+  kRandomDelay,      // some readings come late by a random amount (random_delay.h)
   kLopsided,         // the noise reaches farther to one side (lopsided_scatter.h)
   kSetAside,         // what the fit set aside is more than a few gross errors (touches_set_aside.h)
   kTicks,            // some of the times were read in ticks (touches/noise/ticks.h)

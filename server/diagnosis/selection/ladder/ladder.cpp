@@ -20,6 +20,7 @@
 #include "server/diagnosis/selection/ladder/surface_step.h"
 #include "server/diagnosis/selection/scatter/lopsided_scatter.h"
 #include "server/diagnosis/selection/scatter/pose_scatter.h"
+#include "server/diagnosis/selection/scatter/random_delay.h"
 #include "server/diagnosis/selection/scatter/touches_set_aside.h"
 #include "server/diagnosis/selection/scatter/uneven_scatter.h"
 #include "server/diagnosis/selection/session/round_structure.h"
@@ -37,7 +38,8 @@ constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says 
 constexpr double kMisfitP = 1e-2;
 constexpr double kRoundsPossibleP =
     0.05;  // of agreement within rounds, for a doubt of what scatter looks like
-constexpr double kMaxBesideMotion = 0.5;  // probability of noise where an object that moves would look alike
+constexpr double kMaxBesideMotion =
+    0.5;  // probability of noise where an object that moves, or a delay, would look alike
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
@@ -233,7 +235,7 @@ class LadderBuilder {
     const touches::NoiseSample sample =
         touches::MakeNoiseSample(observations_, ladder_.residuals, ladder_.prediction);
     uneven_ = FindUnevenScatter(observations_, ladder_.prediction, sample, selection_.noise);
-    if (!uneven_) return AskLopsidedScatter(sample, noise);
+    if (!uneven_) return AskShapeOfScatter(sample, noise);
     found_.Add(Hypothesis::kUnevenScatter, uneven_->words, [this](engine::UnexplainedRest* rest) {
       NameUnevenScatter(*uneven_, found_.Leave(Leaves::kMeans), rest);
     });
@@ -241,30 +243,39 @@ class LadderBuilder {
     if (uneven_->finger >= 0) noise->channel_sigma_s.clear();
   }
 
-  // What reaches farther to one side looks heavy-tailed. A misfit does by itself.
-  void AskLopsidedScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
+  // What comes late now and then looks like more noise, or heavy-tailed. A misfit does by itself.
+  void AskShapeOfScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
     if (selection_.noise.poll_interval_s.gain_nats > 0 || found_.Leave(Leaves::kMeans) ||
         selection_.fit.hypothesis != 0)
       return;
+    delay_ = FindRandomDelay(sample, selection_.noise, observations_.fingers);
+    if (delay_ && delay_->ahead) {
+      found_.Add(Hypothesis::kRandomDelay, delay_->words);
+      *noise = WithoutDelays(*delay_, std::move(*noise));
+      return;
+    }
     const auto lopsided = FindLopsidedScatter(sample.groups, observations_.fingers);
     if (!lopsided) return;
     found_.Add(Hypothesis::kLopsided, lopsided->words);
     noise->degrees_of_freedom = {};
   }
 
-  // Of the steps of noise, what an object that moves would look like.
+  // Of the steps of noise, what an object that moves, or a random delay, would look like.
   void DoubtNoise() {
+    const std::string level = effects::FindByRole(model::EffectRole::kNoiseLevel)->name;
+    const std::string tails = effects::FindByRole(model::EffectRole::kNoiseTails)->name;
     for (size_t j = first_of_noise_; j < ladder_.steps.size(); ++j) {
-      engine::LadderStep& step = ladder_.steps[j];
-      if (rounds_.p < kRoundsPossibleP) {
-        step.probability = std::min(step.probability, kMaxBesideMotion);
-        step.words = "Repeats agree within rounds: an object put down anew each round would look alike.";
-      }
-      const auto level = effects::FindByRole(model::EffectRole::kNoiseLevel);
-      if (!pose_scatter_ || step.effect == level->name) continue;
-      step.probability = std::min(step.probability, kMaxBesideMotion);
-      engine::AddWords(pose_scatter_->words, &step);
+      engine::LadderStep* step = &ladder_.steps[j];
+      if (rounds_.p < kRoundsPossibleP)
+        DoubtStep("Repeats agree within rounds: an object put down anew each round would look alike.", step);
+      if (pose_scatter_ && step->effect != level) DoubtStep(pose_scatter_->words, step);
+      if (delay_ && step->effect == tails) DoubtStep(delay_->words, step);
     }
+  }
+
+  static void DoubtStep(const std::string& words, engine::LadderStep* step) {
+    step->probability = std::min(step->probability, kMaxBesideMotion);
+    engine::AddWords(words, step);
   }
 
   absl::Status DescribeRest() {
@@ -308,6 +319,7 @@ class LadderBuilder {
   size_t first_of_noise_ = 0;  // step
   std::optional<PoseScatter> pose_scatter_;
   std::optional<UnevenScatter> uneven_;
+  std::optional<RandomDelay> delay_;
 };
 
 }  // namespace

@@ -45,7 +45,8 @@ TEST(Ladder, ReadingsThatComeLateNowAndThenAreNoHeavyTails) {
   EXPECT_EQ(ladder.verdict, engine::Verdict::kUnexplained);
   EXPECT_THAT(ladder.steps, Each(Field(&engine::LadderStep::effect, Ne("heavy_tail_noise"))));
   ASSERT_TRUE(ladder.unexplained.has_value());
-  EXPECT_THAT(ladder.unexplained->words, HasSubstr("scatter farther to the late side"));
+  EXPECT_THAT(ladder.unexplained->words,
+              HasSubstr("come late by an amount that is exponentially distributed"));
 }
 
 // Kind: what a misfit looks like is not said of the noise.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnosis/touches/noise/golden_section.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
@@ -128,24 +129,15 @@ double ProfileSigma(const std::vector<ReadingGroup>& groups, NoiseModel* model) 
     model->sigma_s = std::sqrt(std::max(squares / std::max(degrees, 1.0), 1e-24));
     return NoiseLogLikelihood(groups, *model);
   }
-  double low = std::log(model->sigma_s) - 1.5, high = std::log(model->sigma_s) + 0.5;
-  const double golden = 0.5 * (std::sqrt(5.0) - 1);
   const auto value = [&](double log_sigma) {
     NoiseModel at = *model;
     at.sigma_s = std::exp(log_sigma);
     return NoiseLogLikelihood(groups, at);
   };
-  double a = high - golden * (high - low), b = low + golden * (high - low);
-  double fa = value(a), fb = value(b);
-  for (int step = 0; step < kSearches && high - low > 1e-3; ++step) {
-    if (fa > fb) {
-      high = b, b = a, fb = fa, a = high - golden * (high - low), fa = value(a);
-    } else {
-      low = a, a = b, fa = fb, b = low + golden * (high - low), fb = value(b);
-    }
-  }
-  model->sigma_s = std::exp(fa > fb ? a : b);
-  return std::max(fa, fb);
+  const double from = std::log(model->sigma_s);
+  double max = 0;
+  model->sigma_s = std::exp(Maximise(value, from - 1.5, from + 0.5, kSearches, &max));
+  return max;
 }
 
 double OutlierProbability(const ReadingGroup& group, const NoiseModel& model) {

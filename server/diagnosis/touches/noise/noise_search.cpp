@@ -5,6 +5,8 @@
 #include <functional>
 #include <utility>
 
+#include "server/diagnosis/touches/noise/golden_section.h"
+
 namespace touchstone::diagnosis::touches {
 namespace {
 
@@ -20,21 +22,6 @@ constexpr double kRepeatsShare = 0.25;      // of the gain that repeats must sho
 constexpr double kRepeatsNats = 3;
 constexpr double kWithoutRepeatsNats = 20;  // gain that a kind needs which no repeat can confirm
 constexpr double kRepeatsKurtosisSigmas = 2;
-
-// The maximum of f on [low, high] by golden section.
-double Maximise(const std::function<double(double)>& f, double low, double high, int steps, double* max) {
-  const double golden = 0.5 * (std::sqrt(5.0) - 1);
-  double a = high - golden * (high - low), b = low + golden * (high - low);
-  double fa = f(a), fb = f(b);
-  for (int step = 0; step < steps; ++step) {
-    if (fa > fb)
-      high = b, b = a, fb = fa, a = high - golden * (high - low), fa = f(a);
-    else
-      low = a, a = b, fa = fb, b = low + golden * (high - low), fb = f(b);
-  }
-  *max = std::max(fa, fb);
-  return fa > fb ? a : b;
-}
 
 // Standard error from the curvature of a log likelihood at its maximum.
 double CurvatureError(const std::function<double(double)>& f, double at, double step) {
