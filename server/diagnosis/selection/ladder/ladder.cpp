@@ -17,16 +17,12 @@
 #include "server/diagnosis/selection/ladder/doubts.h"
 #include "server/diagnosis/selection/ladder/hypotheses.h"
 #include "server/diagnosis/selection/ladder/model_posterior.h"
+#include "server/diagnosis/selection/ladder/noise_questions.h"
 #include "server/diagnosis/selection/ladder/surface_step.h"
-#include "server/diagnosis/selection/scatter/lopsided_scatter.h"
-#include "server/diagnosis/selection/scatter/pose_scatter.h"
-#include "server/diagnosis/selection/scatter/random_delay.h"
 #include "server/diagnosis/selection/scatter/touches_set_aside.h"
-#include "server/diagnosis/selection/scatter/uneven_scatter.h"
 #include "server/diagnosis/selection/session/round_structure.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
-#include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 #include "server/effects/all_effects.h"
 
@@ -36,10 +32,6 @@ namespace {
 constexpr double kSurfaceNats = 5;        // evidence that asks for a surface error by itself
 constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
 constexpr double kMisfitP = 1e-2;
-constexpr double kRoundsPossibleP =
-    0.05;  // of agreement within rounds, for a doubt of what scatter looks like
-constexpr double kMaxBesideMotion =
-    0.5;  // probability of noise where an object that moves, or a delay, would look alike
 constexpr double kSameSurface =
     2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
@@ -69,10 +61,11 @@ class LadderBuilder {
     AskTicks();
     TOUCHSTONE_RETURN_IF_ERROR(SetFinal());
     TOUCHSTONE_RETURN_IF_ERROR(AskSurface());
-    AskPoseScatter();
+    NoiseQuestions noise(observations_, selection_, &found_, &ladder_);
+    noise.AskPoseScatter();
     if (found_.Allows(Question::kMisfit) && engine::StructureRemains(left_, ladder_.noise_floor.sigma))
       found_.Add(Hypothesis::kMisfit);
-    AddNoise();
+    noise.AddSteps(rounds_.p);
     TOUCHSTONE_ASSIGN_OR_RETURN(
         ladder_.candidates,
         engine::RankCandidates(*selection_.search, selection_.initial_model, selection_.initial_effects,
@@ -207,77 +200,6 @@ class LadderBuilder {
     return absl::OkStatus();
   }
 
-  void AskPoseScatter() {
-    if (selection_.memory) AddMemoryStep(*selection_.memory, &ladder_);
-    first_of_noise_ = ladder_.steps.size();
-    if (!found_.Allows(Question::kPoseScatter)) return;
-    pose_scatter_ = FindPoseScatter(observations_, ladder_.prediction, ladder_.residuals, selection_.noise);
-    if (pose_scatter_ && pose_scatter_->ahead) found_.Add(Hypothesis::kPlay, pose_scatter_->words);
-  }
-
-  void AddNoise() {
-    if (found_.Allows(Question::kNoise) && !ladder_.noise_floor.is_rounding) {
-      touches::NoiseFindings noise = selection_.noise;
-      AskUnevenScatter(&noise);
-      AddNoiseSteps(std::move(noise), selection_.memory.has_value(), &ladder_);
-    }
-    DoubtNoise();
-    if (found_.Allows(Question::kAbsentMemory)) RemoveAbsentMemory(observations_, &ladder_);
-  }
-
-  // Where something else makes touches scatter, parts of the set scatter differently for that reason; repeats know nothing
-  // of a misfit.
-  void AskUnevenScatter(touches::NoiseFindings* noise) {
-    const bool misfit = found_.Has(Hypothesis::kFormula) || found_.Has(Hypothesis::kMisfit) ||
-                        found_.Has(Hypothesis::kUnplaced) || found_.Leave(Leaves::kDoubts) ||
-                        selection_.fit.hypothesis != 0;
-    if (!found_.Allows(Question::kUnevenScatter) || (!ladder_.noise_floor.from_repeats && misfit)) return;
-    const touches::NoiseSample sample =
-        touches::MakeNoiseSample(observations_, ladder_.residuals, ladder_.prediction);
-    uneven_ = FindUnevenScatter(observations_, ladder_.prediction, sample, selection_.noise);
-    if (!uneven_) return AskShapeOfScatter(sample, noise);
-    found_.Add(Hypothesis::kUnevenScatter, uneven_->words, [this](engine::UnexplainedRest* rest) {
-      NameUnevenScatter(*uneven_, found_.Leave(Leaves::kMeans), rest);
-    });
-    if (!uneven_->tails_remain) noise->degrees_of_freedom = {};
-    if (uneven_->finger >= 0) noise->channel_sigma_s.clear();
-  }
-
-  // What comes late now and then looks like more noise, or heavy-tailed. A misfit does by itself.
-  void AskShapeOfScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
-    if (selection_.noise.poll_interval_s.gain_nats > 0 || found_.Leave(Leaves::kMeans) ||
-        selection_.fit.hypothesis != 0)
-      return;
-    delay_ = FindRandomDelay(sample, selection_.noise, observations_.fingers);
-    if (delay_ && delay_->ahead) {
-      found_.Add(Hypothesis::kRandomDelay, delay_->words);
-      *noise = WithoutDelays(*delay_, std::move(*noise));
-      return;
-    }
-    const auto lopsided = FindLopsidedScatter(sample.groups, observations_.fingers);
-    if (!lopsided) return;
-    found_.Add(Hypothesis::kLopsided, lopsided->words);
-    noise->degrees_of_freedom = {};
-  }
-
-  // Of the steps of noise, what an object that moves, or a random delay, would look like.
-  void DoubtNoise() {
-    const std::string level = effects::FindByRole(model::EffectRole::kNoiseLevel)->name;
-    const std::string tails = effects::FindByRole(model::EffectRole::kNoiseTails)->name;
-    for (size_t j = first_of_noise_; j < ladder_.steps.size(); ++j) {
-      engine::LadderStep* step = &ladder_.steps[j];
-      if (rounds_.p < kRoundsPossibleP)
-        DoubtStep("Repeats agree within rounds: an object put down anew each round would look alike.", step);
-      if (pose_scatter_ && step->effect != level) DoubtStep(pose_scatter_->words, step);
-      if (delay_ && step->effect == tails) DoubtStep(delay_->words, step);
-    }
-  }
-
-  static void DoubtStep(const std::string& words, engine::LadderStep* step) {
-    step->probability = std::min(step->probability, kMaxBesideMotion);
-    engine::AddWords(words, step);
-  }
-
   absl::Status DescribeRest() {
     if (!found_.Leave(Leaves::kScatter)) return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
@@ -316,10 +238,6 @@ class LadderBuilder {
   Hypotheses found_;
   engine::Quality left_;  // on the touches that the fits used: what the verdict is about
   RoundStructure rounds_;
-  size_t first_of_noise_ = 0;  // step
-  std::optional<PoseScatter> pose_scatter_;
-  std::optional<UnevenScatter> uneven_;
-  std::optional<RandomDelay> delay_;
 };
 
 }  // namespace

@@ -17,9 +17,9 @@ struct RandomDelay {
   touches::NoiseEstimate sigma_s;  // of the normal noise beside it
   double length_m = 0;             // of a delay of the travel
   bool plain_noise = false;        // that noise has one scale, whatever kinds were found without the delays
-  bool ahead = false;              // of noise without delays; false: the two explain the scatter about as well
-  double gain_nats = 0;            // over the best noise without delays
-  std::string words;               // sentences for people
+  bool ahead = false;    // of noise without delays; false: the two explain the scatter about as well
+  double gain_nats = 0;  // over the best noise without delays
+  std::string words;     // sentences for people
 };
 
 // `sample`: of the residuals of the best model; `noise`: found in the same residuals; `fingers`: of the end effector. Nothing
