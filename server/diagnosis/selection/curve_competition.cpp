@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/formula/lookup.h"
 
@@ -228,11 +229,13 @@ class Competition {
   // Correlated noise has no course that another session would repeat: it is noise, which a curve only traces.
   absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<NoiseMemory> memory, MemoryOf(with.fit));
-    if (!memory || !memory->everywhere ||
-        memory->gain_nats <
-            std::max({with.curve.gain_nats, memory->step_gain_nats, memory->period_gain_nats}) +
-                kMemoryNats ||
-        memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
+    if (!memory) return false;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(with.fit));
+    const double course = std::max({with.curve.gain_nats, memory->step_gain_nats, memory->period_gain_nats});
+    if (declared ? course > memory->gain_nats + kMemoryNats ||
+                       memory->smooth_gain_nats > memory->gain_nats + kMemoryNats
+                 : !memory->everywhere || memory->gain_nats < course + kMemoryNats ||
+                       memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
       return false;
     result_.fit = with.fit;
     TOUCHSTONE_RETURN_IF_ERROR(DropWhatIsCorrelated(&*memory));
@@ -240,6 +243,18 @@ class Competition {
     result_.without_formula = result_.fit;
     result_.formula = -1;
     return true;
+  }
+
+  // Whether the given model has correlated noise that the residuals do not rule out: it is what a course must be ahead of.
+  absl::StatusOr<bool> IsDeclaredMemory(const engine::Fit& fit) const {
+    const model::EffectInstance* declared = DeclaredMemoryOf(*workspace_.input.model);
+    if (declared == nullptr) return false;
+    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
+                                workspace_.searched_predictor->Run(fit.model.base(), false, false));
+    const touches::Observations& o = *workspace_.searched;
+    return !AssessDeclaredMemory(o, touches::Residuals(o, prediction), declared->values[0],
+                                 declared->values[1])
+                .absent;
   }
 
   // Effects that were found under noise without memory must be worth their values under correlated noise too.
@@ -256,13 +271,14 @@ class Competition {
     return absl::OkStatus();
   }
 
-  // No curve says how, but repeats share a course in time.
+  // No curve says how, but repeats share a course in time, or the given model says that they do.
   absl::Status LookForMemory(const engine::Fit& named) {
+    if (result_.formula >= 0) return absl::OkStatus();
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(named));
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.searched_predictor->Run(named.model.base(), false, false));
     const touches::Observations& o = *workspace_.searched;
-    if (result_.formula >= 0 ||
-        !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kTimeStructureP))
+    if (!declared && !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kTimeStructureP))
       return absl::OkStatus();
     return IsNoiseWithMemory({named, NamelessCurve()}).status();
   }

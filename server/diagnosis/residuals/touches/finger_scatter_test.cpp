@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
@@ -32,6 +34,26 @@ TEST(FingerScatter, FindsNoneInOneNoiseForAll) {
     const touches::SyntheticSet set(3, 48, 4, touches::kSyntheticSigmaS, 100 + seed);
     EXPECT_FALSE(FindFingerScatter(set.observations, set.residuals)) << seed;
   }
+}
+
+// Kind: what a test takes for independent that is not.
+TEST(FingerScatter, FindsNoneInCorrelatedNoiseOfAllFingers) {
+  int found = 0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
+    touches::SyntheticSet set(3, 48, 4, 0.3 * touches::kSyntheticSigmaS, 200 + seed);
+    RandomStream random(seed, RandomDomain::kTest);
+    const double rho = std::exp(-1.0 / 30);  // of a memory of thirty touches
+    for (int i = 0; i < 3; ++i) {
+      double state = random.Normal();
+      for (int k = 0; k < set.size(); ++k) {
+        state = rho * state + std::sqrt(1 - rho * rho) * random.Normal();
+        set.observations.time_s[k * 3 + i] += touches::kSyntheticSigmaS * state;
+      }
+    }
+    set.Finish();
+    found += FindFingerScatter(set.observations, set.residuals).has_value();
+  }
+  EXPECT_LE(found, 1);
 }
 
 TEST(FingerScatter, IsNotFooledByFewWildTouches) {

@@ -19,6 +19,7 @@
 #include "server/diagnosis/selection/ladder/model_posterior.h"
 #include "server/diagnosis/selection/ladder/noise_questions.h"
 #include "server/diagnosis/selection/ladder/surface_step.h"
+#include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/scatter/touches_set_aside.h"
 #include "server/diagnosis/selection/session/round_structure.h"
 #include "server/diagnosis/selection/session/time_structure.h"
@@ -113,11 +114,7 @@ class LadderBuilder {
   // A drift of which the session does not show that it reverts to its mean is no noise of a known memory, unless the given
   // model says so.
   bool IsRandomWalk() const {
-    const auto& given = workspace_.input.model->effects;
-    return !RevertsToMean(*selection_.memory) &&
-           std::none_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
-             return instance.effect->role == model::EffectRole::kNoiseMemory;
-           });
+    return !RevertsToMean(*selection_.memory) && DeclaredMemoryOf(*workspace_.input.model) == nullptr;
   }
 
   static std::string CourseInWords(std::string words) {

@@ -44,8 +44,8 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* 
 // time, only its level, ticks and dropouts are judged: correlated noise by itself makes fingers differ and tails heavy.
 void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder);
 
-// Correlated noise of the fingers, as a step or a refit.
-void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder);
+// Correlated noise of the fingers, as a step, or as a refit where the residuals rule the model's own values out.
+void AddMemoryStep(const NoiseMemory& memory, const touches::Observations& observations, Ladder* ladder);
 
 // Takes correlated noise out of the improved model that the given one has and the residuals rule out.
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);

@@ -29,7 +29,7 @@ NoiseQuestions::NoiseQuestions(const touches::Observations& observations, const 
     : observations_(observations), selection_(selection), found_(found), ladder_(ladder) {}
 
 void NoiseQuestions::AskPoseScatter() {
-  if (selection_.memory) AddMemoryStep(*selection_.memory, ladder_);
+  if (selection_.memory) AddMemoryStep(*selection_.memory, observations_, ladder_);
   first_of_noise_ = ladder_->steps.size();
   if (!found_->Allows(Question::kPoseScatter)) return;
   pose_scatter_ = FindPoseScatter(observations_, ladder_->prediction, ladder_->residuals, selection_.noise);

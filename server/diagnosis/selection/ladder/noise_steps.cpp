@@ -167,17 +167,19 @@ class NoiseStepWriter {
 
 }  // namespace
 
-void AddMemoryStep(const NoiseMemory& memory, Ladder* ladder) {
+void AddMemoryStep(const NoiseMemory& memory, const touches::Observations& observations, Ladder* ladder) {
+  const model::EffectInstance* declared = DeclaredMemoryOf(ladder->improved);
+  if (declared != nullptr &&
+      !AssessDeclaredMemory(observations, ladder->residuals, declared->values[0], declared->values[1]).other)
+    return;
   NoiseStepWriter(ladder).WriteMemory(memory);
 }
 
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder) {
-  for (const model::EffectInstance& instance : ladder->improved.effects) {
-    if (instance.effect->role != model::EffectRole::kNoiseMemory || !instance.object_values.empty()) continue;
-    if (!NoiseMemoryIsAbsent(observations, ladder->residuals, instance.values[0], instance.values[1])) return;
+  const model::EffectInstance* declared = DeclaredMemoryOf(ladder->improved);
+  if (declared != nullptr &&
+      AssessDeclaredMemory(observations, ladder->residuals, declared->values[0], declared->values[1]).absent)
     NoiseStepWriter(ladder).Remove(model::EffectRole::kNoiseMemory);
-    return;
-  }
 }
 
 namespace {
@@ -202,7 +204,8 @@ touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine
 
 void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder) {
   NoiseStepWriter writer(ladder);
-  if (correlated || SharesTime(ladder->noise_floor)) {
+  const bool in_time = correlated || SharesTime(ladder->noise_floor);
+  if (in_time) {
     noise.slope = noise.degrees_of_freedom = noise.length_sigma_m = {};
     noise.channel_sigma_s.clear();
     noise.channels_absent = false;
@@ -214,9 +217,15 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
-  if (sigma.absent)
+  // The level that a model has beside kinds of noise that are not judged here says nothing by itself.
+  const touches::DeclaredNoise declared = DeclaredNoiseOf(given);
+  const bool level_alone = !declared.slope && !declared.degrees_of_freedom && !declared.length_sigma_m &&
+                           declared.channel_sigma_s.empty();
+  const bool judged = level_alone || !in_time;
+  if (judged && sigma.absent)
     writer.Remove(model::EffectRole::kNoiseLevel);
-  else if (scatter && (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kMinFloorUs))
+  else if (judged && scatter &&
+           (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kMinFloorUs))
     writer.Write(model::EffectRole::kNoiseLevel, sigma);
   writer.WriteOrRemove(model::EffectRole::kNoiseGrowth, noise.slope);
   writer.WriteOrRemove(model::EffectRole::kNoiseTails, noise.degrees_of_freedom);

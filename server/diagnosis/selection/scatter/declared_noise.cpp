@@ -56,4 +56,10 @@ double DeclaredSigma(const model::Model& model) {
   return plain ? declared.sigma_s : 0;
 }
 
+const model::EffectInstance* DeclaredMemoryOf(const model::Model& model) {
+  for (const model::EffectInstance& instance : model.effects)
+    if (instance.effect->role == EffectRole::kNoiseMemory && instance.object_values.empty()) return &instance;
+  return nullptr;
+}
+
 }  // namespace touchstone::diagnosis::selection

@@ -12,4 +12,7 @@ touches::DeclaredNoise DeclaredNoiseOf(const model::Model& model);
 // Standard deviation of one reading of a finger, s, if the model gives one for all readings; 0: it does not.
 double DeclaredSigma(const model::Model& model);
 
+// The correlated noise that the model gives all objects; nullptr: none.
+const model::EffectInstance* DeclaredMemoryOf(const model::Model& model);
+
 }  // namespace touchstone::diagnosis::selection

@@ -249,19 +249,32 @@ BestCorrelated FindBest(CorrelatedLikelihood (*likelihood)(const Course&, double
   return best;
 }
 
+// The session of complete touches; nothing where it cannot show a memory.
+struct SessionCourse {
+  Course course;
+  double min_s = 0, max_s = 0;  // times of memory that it can show
+};
+
+std::optional<SessionCourse> SessionOf(const touches::Observations& o, const std::vector<double>& residuals) {
+  if (!o.set->has_session_time || o.fingers < 2) return std::nullopt;
+  SessionCourse session{CourseOf(o, residuals)};
+  if (session.course.touches() < kMinComplete) return std::nullopt;
+  double span_s = 0;
+  for (const double gap_s : session.course.gap_s)
+    if (std::isfinite(gap_s)) span_s += gap_s;
+  session.min_s = span_s / session.course.touches(), session.max_s = span_s / 2;
+  if (!(session.min_s > 0)) return std::nullopt;
+  return session;
+}
+
 }  // namespace
 
 std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
                                            const std::vector<double>& residuals) {
-  if (!o.set->has_session_time || o.fingers < 2) return std::nullopt;
-  const Course course = CourseOf(o, residuals);
-  if (course.touches() < kMinComplete) return std::nullopt;
-  double span_s = 0;
-  for (const double gap_s : course.gap_s)
-    if (std::isfinite(gap_s)) span_s += gap_s;
-  const double min_s = span_s / course.touches(), max_s = span_s / 2;
-  if (!(min_s > 0)) return std::nullopt;
-
+  const std::optional<SessionCourse> session = SessionOf(o, residuals);
+  if (!session) return std::nullopt;
+  const Course& course = session->course;
+  const double min_s = session->min_s, max_s = session->max_s;
   const BestCorrelated correlated = FindBest(Likelihood, course, min_s, max_s);
   const CorrelatedLikelihood& best = correlated.likelihood;
   const double ratio = correlated.ratio, time_s = correlated.time_s;
@@ -277,10 +290,18 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   found.smooth_gain_nats = FindBest(SmoothLikelihood, course, min_s, max_s).likelihood.log_likelihood -
                            Likelihood(course, 0, time_s).log_likelihood - std::log(count);
   found.period_gain_nats = PeriodGain(course);
-  found.white_s = {best.white_s, best.white_s / std::sqrt(2 * count), 0};
+  const double ratio_error = LogError(course, ratio, time_s, false);
+  const double time_error = LogError(course, ratio, time_s, true);
+  constexpr double kMaxStep = 2;  // of a logarithm
+  // How large the noise without memory is hangs on the ratio and the time too.
+  const double by_ratio_s =
+      Likelihood(course, ratio * std::exp(std::min(ratio_error, kMaxStep)), time_s).white_s - best.white_s;
+  const double by_time_s =
+      Likelihood(course, ratio, time_s * std::exp(std::min(time_error, kMaxStep))).white_s - best.white_s;
+  found.white_s = {best.white_s, std::hypot(best.white_s / std::sqrt(2 * count), by_ratio_s, by_time_s), 0};
   found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};
-  found.sigma_s.std_error = 0.5 * found.sigma_s.value * LogError(course, ratio, time_s, false);
-  found.time_s = {time_s, time_s * LogError(course, ratio, time_s, true), found.gain_nats};
+  found.sigma_s.std_error = 0.5 * found.sigma_s.value * ratio_error;
+  found.time_s = {time_s, time_s * time_error, found.gain_nats};
   return found;
 }
 
@@ -288,15 +309,12 @@ bool RevertsToMean(const NoiseMemory& memory) {
   return memory.forgets_nats > kForgetsNats;
 }
 
-bool NoiseMemoryIsAbsent(const touches::Observations& o, const std::vector<double>& residuals, double sigma_s,
-                         double time_s) {
+DeclaredMemory AssessDeclaredMemory(const touches::Observations& o, const std::vector<double>& residuals,
+                                    double sigma_s, double time_s) {
   constexpr double kRuledOutNats = 5;
-  if (!o.set->has_session_time || o.fingers < 2 || !(sigma_s > 0)) return false;
-  const Course course = CourseOf(o, residuals);
-  double span_s = 0;
-  for (const double gap_s : course.gap_s)
-    if (std::isfinite(gap_s)) span_s += gap_s;
-  if (course.touches() < kMinComplete || time_s > 0.5 * span_s) return false;
+  const std::optional<SessionCourse> session = SessionOf(o, residuals);
+  if (!session || !(sigma_s > 0) || time_s > session->max_s) return {};
+  const Course& course = session->course;
   const double count = static_cast<double>(course.touches()) * course.channels;
   const double none = Likelihood(course, 0, time_s).log_likelihood;
   // The correlated noise has its size; the white noise beside it is what fits best.
@@ -308,7 +326,8 @@ bool NoiseMemoryIsAbsent(const touches::Observations& o, const std::vector<doubl
     const double over = profiled.white_s * profiled.white_s / white2;
     declared = std::max(declared, profiled.log_likelihood - 0.5 * count * (over - 1 - std::log(over)));
   }
-  return none - declared > kRuledOutNats;
+  const double best = FindBest(Likelihood, course, session->min_s, session->max_s).likelihood.log_likelihood;
+  return {none - declared > kRuledOutNats, best - declared > kRuledOutNats};
 }
 
 }  // namespace touchstone::diagnosis::selection

@@ -35,9 +35,14 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& observat
 // Whether the data say that it reverts to its mean within the session.
 bool RevertsToMean(const NoiseMemory& memory);
 
-// Whether correlated noise of this size that a model has is ruled out: none of it fits the residuals better by 5 nats. False
-// where the set could not show it (few touches, no session times, a memory longer than half the session).
-bool NoiseMemoryIsAbsent(const touches::Observations& observations, const std::vector<double>& residuals,
-                         double sigma_s, double time_s);
+// What the residuals say of correlated noise that a model has.
+struct DeclaredMemory {
+  bool absent = false;  // none of it fits the residuals better by 5 nats
+  bool other = false;   // another size or time does
+};
+
+// Neither where the set could not show it (few touches, no session times, a memory longer than half the session).
+DeclaredMemory AssessDeclaredMemory(const touches::Observations& observations,
+                                    const std::vector<double>& residuals, double sigma_s, double time_s);
 
 }  // namespace touchstone::diagnosis::selection

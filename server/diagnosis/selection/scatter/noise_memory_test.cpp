@@ -113,17 +113,17 @@ TEST(NoiseMemory, AnEventIsNoCorrelatedNoise) {
   EXPECT_FALSE(FindNoiseMemory(session.o, session.residuals)->everywhere);
 }
 
-TEST(NoiseMemoryIsAbsent, WhereThereIsNoiseWithoutMemoryOnly) {
+TEST(DeclaredMemory, IsAbsentWhereThereIsNoiseWithoutMemoryOnly) {
   for (uint64_t seed = 20; seed < 24; ++seed) {
     const CourseOfSession session(seed, [](int, int, RandomStream*) { return 0.0; });
-    EXPECT_TRUE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.007, 300));
+    EXPECT_TRUE(AssessDeclaredMemory(session.o, session.residuals, 0.007, 300).absent);
     // These data could not show them.
-    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.0001, 300));
-    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.007, 9000));
+    EXPECT_FALSE(AssessDeclaredMemory(session.o, session.residuals, 0.0001, 300).absent);
+    EXPECT_FALSE(AssessDeclaredMemory(session.o, session.residuals, 0.007, 9000).absent);
   }
 }
 
-TEST(NoiseMemoryIsAbsent, NotWhereItIs) {
+TEST(DeclaredMemory, IsNeitherAbsentNorAnotherWhereItIs) {
   for (uint64_t seed = 30; seed < 34; ++seed) {
     double state[3] = {0, 0, 0};
     const CourseOfSession session(seed, [&state](int, int i, RandomStream* random) {
@@ -131,7 +131,10 @@ TEST(NoiseMemoryIsAbsent, NotWhereItIs) {
       state[i] = rho * state[i] + 0.004 * std::sqrt(1 - rho * rho) * random->Normal();
       return state[i];
     });
-    EXPECT_FALSE(NoiseMemoryIsAbsent(session.o, session.residuals, 0.004, 300));
+    EXPECT_FALSE(AssessDeclaredMemory(session.o, session.residuals, 0.004, 300).absent);
+    EXPECT_FALSE(AssessDeclaredMemory(session.o, session.residuals, 0.004, 300).other);
+    EXPECT_TRUE(AssessDeclaredMemory(session.o, session.residuals, 0.012, 300).other);
+    EXPECT_TRUE(AssessDeclaredMemory(session.o, session.residuals, 0.004, 15).other);
   }
 }
 
