@@ -109,7 +109,7 @@ absl::StatusOr<engine::TriedPValues> BoardSearch::TryAll(uint64_t seed) const {
   const engine::StepwiseSearch search = SearchAmong(all_);
   TOUCHSTONE_ASSIGN_OR_RETURN(const engine::GivenAndEffects tried,
                               engine::ColumnsOfEffects(search, model::NominalModel()));
-  engine::LinearHypotheses hypotheses(rows_->EliminatedValues());
+  engine::LinearHypotheses hypotheses(rows_->EliminatedValues(), rows_->GroupRows());
   hypotheses.AddEffects(*rows_, tried.effects);
   Eigen::MatrixXd together(rows_->rows(), 0);
   for (const engine::EffectColumns& effect : tried.effects) {

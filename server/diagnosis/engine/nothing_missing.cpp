@@ -60,6 +60,22 @@ void LinearHypotheses::AddEffects(const ObservationModel& rows, const std::vecto
   }
 }
 
+double LinearHypotheses::Overdispersion(const Basis& basis, const Eigen::VectorXd& residual,
+                                        double variance) const {
+  const Eigen::VectorXd left =
+      residual.segment(basis.first_row, basis.columns.rows()) -
+      basis.columns * (basis.columns.transpose() * residual.segment(basis.first_row, basis.columns.rows()));
+  double squares = 0;
+  for (size_t c = 0; c + 1 < clusters_.size(); ++c) {
+    const int first = std::max(clusters_[c] - basis.first_row, 0);
+    const int rows = std::min<int>(clusters_[c + 1] - basis.first_row, basis.columns.rows()) - first;
+    if (rows > 0)
+      squares +=
+          (basis.columns.middleRows(first, rows).transpose() * left.segment(first, rows)).squaredNorm();
+  }
+  return std::max(squares / (variance * static_cast<double>(basis.columns.cols())), 1.0);
+}
+
 Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) const {
   Eigen::MatrixXd p_values(size(), residuals.cols());
   const Eigen::RowVectorXd all = residuals.colwise().squaredNorm();
@@ -71,9 +87,13 @@ Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) cons
             .squaredNorm();
     const double rank = static_cast<double>(basis.columns.cols());
     const double left = static_cast<double>(residuals.rows()) - eliminated_ - rank;
-    for (int draw = 0; draw < residuals.cols(); ++draw)
-      p_values(h, draw) =
-          FisherTail(taken[draw] / rank / std::max((all[draw] - taken[draw]) / left, 1e-300), rank, left);
+    const bool clustered = clusters_.size() > 2;
+    const double degrees = clustered ? static_cast<double>(clusters_.size()) - 2 : left;
+    for (int draw = 0; draw < residuals.cols(); ++draw) {
+      const double variance = std::max((all[draw] - taken[draw]) / left, 1e-300);
+      const double over = clustered ? Overdispersion(basis, residuals.col(draw), variance) : 1;
+      p_values(h, draw) = FisherTail(taken[draw] / rank / (variance * over), rank, degrees);
+    }
   }
   return p_values;
 }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -25,7 +26,10 @@ using TriedPValues = Eigen::MatrixXd;
 class LinearHypotheses {
  public:
   // `eliminated`: degrees of freedom that values of the rows' own take (ObservationModel::EliminatedValues).
-  explicit LinearHypotheses(int eliminated = 0) : eliminated_(eliminated) {}
+  // `clusters`: first row of each part whose rows may share their errors (corners of a picture), then the number of rows; none:
+  // rows err independently.
+  explicit LinearHypotheses(int eliminated = 0, std::vector<int> clusters = {})
+      : eliminated_(eliminated), clusters_(std::move(clusters)) {}
 
   // `columns`: rows `first_row` .. of the data, which may be all of them. Of no rank: not tried.
   void Add(const Eigen::MatrixXd& columns, int first_row = 0);
@@ -35,7 +39,8 @@ class LinearHypotheses {
   void AddEffects(const ObservationModel& rows, const std::vector<EffectColumns>& effects);
   int size() const { return static_cast<int>(bases_.size()); }
 
-  // p value of each hypothesis (rows) for each draw (columns of `residuals`): F test of what the columns take off.
+  // p value of each hypothesis (rows) for each draw (columns of `residuals`): F test of what the columns take off. With clusters the
+  // noise of what they take is that which differs from cluster to cluster, where it is more than rows that err independently make.
   Eigen::MatrixXd PValues(const Eigen::MatrixXd& residuals) const;
 
  private:
@@ -43,8 +48,12 @@ class LinearHypotheses {
     Eigen::MatrixXd columns;  // orthonormal
     int first_row = 0;
   };
+  // By how much what a basis takes off `residual` scatters more from cluster to cluster than rows of this variance make it.
+  double Overdispersion(const Basis& basis, const Eigen::VectorXd& residual, double variance) const;
+
   std::vector<Basis> bases_;
   int eliminated_ = 0;
+  std::vector<int> clusters_;
 };
 
 // Columns: `residual`, then what noise alone leaves of these rows, of variance 1 in each direction that they have.

@@ -94,6 +94,28 @@ TEST(NothingMissing, HasTheTailOfFishersRatio) {
   EXPECT_NEAR(one.PValues(residuals)(0, 0), 0.00394, 0.00005);
 }
 
+// Kind: what a test takes for independent that is not. Corners of one picture are off together.
+TEST(NothingMissing, IsNotSmallWhereClustersShareTheirErrors) {
+  constexpr int kClusters = 12, kRows = 50;
+  std::vector<int> first;
+  for (int c = 0; c <= kClusters; ++c) first.push_back(c * kRows);
+  const Eigen::MatrixXd columns = Normal(kClusters * kRows, 3, 50);
+  LinearHypotheses together(0, first), apart;
+  for (int j = 0; j < columns.cols(); ++j) together.Add(columns.col(j)), apart.Add(columns.col(j));
+  int small = 0, small_apart = 0;
+  for (int set = 0; set < 40; ++set) {
+    Eigen::MatrixXd residuals = Normal(kClusters * kRows, kDraws + 1, 60 + 2 * set);
+    const Eigen::MatrixXd shared = Normal(kClusters, 3, 61 + 2 * set);
+    for (int c = 0; c < kClusters; ++c)
+      residuals.col(0).segment(first[c], kRows) +=
+          columns.middleRows(first[c], kRows) * shared.row(c).transpose();
+    small += WorstOfAll(together.PValues(residuals)).p < 0.02;
+    small_apart += WorstOfAll(apart.PValues(residuals)).p < 0.02;
+  }
+  EXPECT_LE(small, 4);
+  EXPECT_GE(small_apart, 20);
+}
+
 TEST(NothingMissing, TriesNoColumnsThatSayNothing) {
   LinearHypotheses none;
   none.Add(Eigen::MatrixXd::Zero(kReadings, 2));
