@@ -92,6 +92,25 @@ TEST(HonestReport, ForbidsAdequateWhereManyTouchesAreSetAside) {
   EXPECT_TRUE(diagnosis.verdict == engine::Verdict::kUnexplained || !diagnosis.steps.empty());
 }
 
+// Kind: what one reading may do to the verdict on all others. Far off, and farther than any object is thick.
+TEST(HonestReport, SetsOneWildReadingAsideAndNamesIt) {
+  touches::HiddenRig rig;
+  rig.hidden = {{"tip_radius", {"radius_mm=2"}}};
+  const DiagnosisInput input = touches::MakeTestInput(rig);
+  const report::Diagnosis whole = Diagnosed(input);
+  ASSERT_EQ(whole.steps.size(), 2u);  // and its noise
+  for (const double late_s : {0.6, 3.0, 20.0, 1000.0}) {
+    const report::Diagnosis diagnosis = Diagnosed(
+        Spoilt(input, [late_s](session::MeasurementSet* set) { set->time_s[3 * 7 + 1] += late_s; }));
+    EXPECT_EQ(diagnosis.verdict, engine::Verdict::kMissingEffects) << late_s << ": " << diagnosis.summary;
+    ASSERT_EQ(diagnosis.steps.size(), 2u) << late_s;
+    EXPECT_EQ(diagnosis.steps[0].effect, "tip_radius");
+    EXPECT_EQ(diagnosis.steps[1].effect, whole.steps[1].effect);
+    EXPECT_NEAR(diagnosis.data[0].reducible_share, whole.data[0].reducible_share, 0.05) << late_s;
+    EXPECT_EQ(diagnosis.data[0].set_aside.count, whole.data[0].set_aside.count + 1) << late_s;
+  }
+}
+
 // The times of one object's last round belong to other poses of the round.
 TEST(HonestReport, NamesTheRoundAndTheObjectThatWereSetAside) {
   const DiagnosisInput input = Spoilt(touches::MakeTestInput({}), [](session::MeasurementSet* set) {

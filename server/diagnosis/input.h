@@ -31,6 +31,8 @@ struct DiagnosisInput {
   std::vector<std::string> settled;
   // A second model that a comparison of touches is made with; null: none.
   std::shared_ptr<const model::Model> other_model;
+  // SHA-256 of the contents of the sets that the model was fitted to, as far as its file says.
+  std::vector<std::string> fitted_to;
   // Whose errors are told as the initial ones; null: the model's.
   std::shared_ptr<const model::Model> initial_model;
   bool IsSettled(const std::string& effect) const {

@@ -214,6 +214,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
                               selection::QualityOf(*workspace, selection.initial_model, before));
+  double judged_s = quality.rmse;  // of the touches that are judged
   selection::SetError(compared_s, &quality);
   diagnosis.data[0].initial = report::InMicroseconds(quality);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, &selection));
@@ -224,6 +225,15 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
     if (!of_rows.empty()) return check_data(of_rows);
   }
   report::AddLadder(ladder, &diagnosis);
+  report::DataReport& data = diagnosis.data[0];
+  // Errors of the surface that the model expects are no misfit.
+  if (ladder.surface_as_given) {
+    const engine::Quality beside = selection::QualityWithoutSurface(*workspace, selection.initial_model);
+    data.initial->lack_of_fit_p = beside.lack_of_fit_p;
+    judged_s = std::min(judged_s, beside.rmse);
+  }
+  // An error and the floor below it are of the same touches.
+  data.reducible_share = report::ReducibleShare(*data.noise_floor, judged_s * kMicrosecondsPerSecond);
   report::SetNothingMissing(engine::WorstOfAll(selection.tried), &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   // A part of a joint diagnosis describes what the model had left before anything was put in place.
@@ -281,6 +291,11 @@ absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
   AddHowWrong(*workspace, residuals, &diagnosis);
+  for (const model::EffectInstance& instance : input.model->effects)
+    if (instance.effect->role == model::EffectRole::kSmoothError)
+      diagnosis.warnings.push_back(
+          absl::StrCat("The model expects surfaces to be wrong (", instance.effect->name,
+                       "): that part of the error is expected, and no comparison takes it off."));
   report::DataReport& data = diagnosis.data[0];
   if (data.noise_floor)
     report::AddResiduals(DescribeBoth(*workspace, workspace->nominal, residuals, workspace->nominal,

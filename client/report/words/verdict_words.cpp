@@ -42,6 +42,10 @@ std::string TimesTheFloor(const v1::Report& report) {
   }
   if (report.verdict() == v1::Report::TOO_LITTLE_DATA)
     return absl::StrCat(times, ", from so few ", scale.readings(), " a rough figure");
+  const uint32_t aside = data.set_aside().outliers();
+  if (aside > 0)
+    return absl::StrCat(times, " with the ", Count(aside), " set aside; of the error of the others ", share,
+                        " is the model's, not noise");
   return absl::StrCat(times, ": ", share, " of the error is the model's, not noise");
 }
 

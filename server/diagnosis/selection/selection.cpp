@@ -193,6 +193,31 @@ absl::StatusOr<bool> ReviseTouches(const engine::Fit& fit, const touches::NoiseF
   return true;
 }
 
+// A few touches that are so far from the given model that beside them nothing else would show.
+void LeaveOutWild(Workspace* workspace) {
+  constexpr double kWild = 100;  // robust standard deviations
+  constexpr double kFewShare = 0.005;
+  constexpr double kSigmaOverMedian = 1.4826;
+  touches::Observations& o = *workspace->observations;
+  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
+  std::vector<double> largest(o.size(), 0), used;
+  for (int k = 0; k < o.size(); ++k) {
+    if (!o.used[k]) continue;
+    for (int i = 0; i < o.fingers; ++i)
+      if (const double r = std::abs(residuals[static_cast<size_t>(k) * o.fingers + i]); !std::isnan(r))
+        largest[k] = std::max(largest[k], r);
+    used.push_back(largest[k]);
+  }
+  if (used.empty()) return;
+  std::nth_element(used.begin(), used.begin() + static_cast<long>(used.size() / 2), used.end());
+  const double bound = kWild * kSigmaOverMedian * used[used.size() / 2];
+  std::vector<int> wild;
+  for (int k = 0; k < o.size(); ++k)
+    if (o.used[k] && bound > 0 && largest[k] > bound) wild.push_back(k);
+  if (static_cast<double>(wild.size()) > std::max(1.0, kFewShare * static_cast<double>(used.size()))) return;
+  for (const int k : wild) touches::LeaveOut(&o, k, touches::kOutlierReason);
+}
+
 // What a part of the session has for itself says nothing of the rest.
 void LeaveOutRows(const GroupDifference& group, touches::Observations* o) {
   std::vector<char> leaves(o->set->size(), 0);
@@ -213,6 +238,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   engine::TriedPValues tried;
   std::optional<GroupDifference> group;
   std::optional<engine::Parameterization> before;
+  LeaveOutWild(workspace);
   for (int pass = 0; pass < kPasses; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
     result = SelectionResult();

@@ -74,6 +74,31 @@ void FindPoses(Observations* o) {
   o->poses = static_cast<int>(poses.size());
 }
 
+// The largest distance along the approach between two fingers that touch the object, m: its box, and what it may lie or be
+// larger.
+double ThicknessAlong(const Observations& o, int k) {
+  constexpr double kLarger = 1.5, kApartM = 0.02;
+  const geometry::Bounds& bounds = o.surfaces[o.object[k]]->bounds();
+  return kLarger * o.set->approach[o.row[k]].cwiseAbs().dot(bounds.max_m - bounds.min_m) + kApartM;
+}
+
+// A few touches whose fingers cannot have met this object, whatever the model; many are no slips of single readings, and stay.
+void LeaveOutImpossible(Observations* o) {
+  constexpr double kFewShare = 0.01;
+  std::vector<int> impossible;
+  for (int k = 0; k < o->size(); ++k) {
+    if (!o->used[k]) continue;
+    double first_s = INFINITY, last_s = -INFINITY;
+    for (int i = 0; i < o->fingers; ++i) {
+      const double time_s = o->time_s[static_cast<size_t>(k) * o->fingers + i];
+      if (!std::isnan(time_s)) first_s = std::min(first_s, time_s), last_s = std::max(last_s, time_s);
+    }
+    if ((last_s - first_s) * o->set->speed_m_s[o->row[k]] > ThicknessAlong(*o, k)) impossible.push_back(k);
+  }
+  if (static_cast<double>(impossible.size()) > std::max(1.0, kFewShare * o->size())) return;
+  for (const int k : impossible) LeaveOut(o, k, kImpossibleReason);
+}
+
 }  // namespace
 
 absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
@@ -107,6 +132,7 @@ absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input) {
     if (reporting == 0) LeaveOut(&o, k, "no finger reported");
     if (reporting == 1) LeaveOut(&o, k, "only one finger reported: there is nothing to compare it with");
   }
+  if (set.has_poses) LeaveOutImpossible(&o);
   return o;
 }
 

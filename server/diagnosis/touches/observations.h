@@ -51,6 +51,10 @@ std::vector<int> RoundsOfTouches(const Observations& observations);
 inline constexpr char kOutlierReason[] =
     "an outlier: one finger's time is far from what all other touches allow";
 
+// The reason of touches whose fingers' contacts lie farther apart along the approach than the object is thick.
+inline constexpr char kImpossibleReason[] =
+    "a reading that is impossible: two fingers' contacts lie farther apart than the object is thick";
+
 // Takes touch k out, with the reason in words for people ("a finger within 0.3 mm of an edge").
 void LeaveOut(Observations* observations, int k, const std::string& reason);
 

@@ -11,6 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/geometry/files/mesh_file.h"
+#include "server/model/provenance.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/sent_model.h"
 #include "server/service/sessions/measured_set_message.h"
@@ -243,6 +244,11 @@ absl::StatusOr<diagnosis::DiagnosisInput> ReadEvidence(const v1::Evidence& messa
   diagnosis::DiagnosisInput input;
   input.seed = message.seed();
   TOUCHSTONE_ASSIGN_OR_RETURN(input.model, FromProto(message.model(), resources));
+  if (message.model().has_yaml()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Provenance provenance,
+                                model::ReadProvenance(message.model().yaml(), "the model"));
+    for (const model::UsedSet& set : provenance.fitted_to) input.fitted_to.push_back(set.sha256);
+  }
   TOUCHSTONE_RETURN_IF_ERROR(ReadAlso(message, resources, &input));
   TOUCHSTONE_RETURN_IF_ERROR(ReadMeasurements(message, resources, &input));
   if (times == TimesOfSet::kNeeded) TOUCHSTONE_RETURN_IF_ERROR(CheckTimes(input.set.get()));

@@ -11,6 +11,7 @@ namespace touchstone::diagnosis::engine {
 namespace {
 
 constexpr double kFewShare = 0.01;      // of the measurements: more are no slips of single readings
+constexpr double kSlipsShare = 0.005;   // of single slips, however far off
 constexpr double kFarAboveNoise = 1.3;  // errors over the noise, that a few gross errors do not bring about
 constexpr double kTogetherP = 1e-3;     // of standing together by chance, over all divisions
 
@@ -69,7 +70,7 @@ std::string SharedGroups(const std::vector<char>& aside, const std::vector<Divis
 }  // namespace
 
 SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
-                        double noise, const std::string& plural) {
+                        double noise, const std::string& plural, int slips) {
   SetAside assessed;
   assessed.of = static_cast<int>(aside.size());
   assessed.count = static_cast<int>(std::count(aside.begin(), aside.end(), 1));
@@ -81,9 +82,10 @@ SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Divisi
       assessed.count, assessed.of, plural, 100 * share);
   const std::string shared = SharedGroups(aside, divisions);
   const double neighbours_p = NeighboursP(aside, assessed.count);
+  const bool single = assessed.count <= slips && share <= kSlipsShare;
   const bool grouped = !shared.empty(), neighbours = neighbours_p < kTogetherP;
   assessed.is_finding =
-      share > kFewShare || grouped || neighbours || (noise > 0 && rmse > kFarAboveNoise * noise);
+      share > kFewShare || grouped || neighbours || (!single && noise > 0 && rmse > kFarAboveNoise * noise);
   absl::StrAppend(&assessed.words, grouped ? "; " + shared : "",
                   neighbours ? grouped ? ", and they follow one another" : "; they follow one another" : "",
                   !grouped && !neighbours ? "; nothing that they share was found" : "", ".");

@@ -21,8 +21,9 @@ struct SetAside {
 };
 
 // `aside[i]`: measurement i, in the order in which they were made. `rmse`: of all measurements, those set aside included;
-// `noise`: what no model can go below, in the same unit. `plural`: "touches".
+// `noise`: what no model can go below, in the same unit. `plural`: "touches". `slips`: so many
+// may be off by any amount and be single slips, where they share nothing and are at most 0.5 %.
 SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Division>& divisions, double rmse,
-                        double noise, const std::string& plural);
+                        double noise, const std::string& plural, int slips = 0);
 
 }  // namespace touchstone::diagnosis::engine

@@ -32,6 +32,16 @@ TEST(SetAside, SaysNothingOfNone) {
   EXPECT_EQ(Assess({}).words, "");
 }
 
+TEST(SetAside, ASlipMayBeOffByAnyAmount) {
+  const auto assess = [](const std::vector<int>& which, int slips) {
+    return AssessSetAside(Aside(which), {ObjectsByTurns()}, 500, 5, "touches", slips).is_finding;
+  };
+  EXPECT_FALSE(assess({17, 302}, 3));
+  EXPECT_TRUE(assess({17, 302}, 0));
+  EXPECT_TRUE(assess({17, 302, 511, 730}, 3));
+  EXPECT_TRUE(assess({17, 18, 19}, 3));
+}
+
 TEST(SetAside, TakesAFewSpreadOnesForGrossErrors) {
   const SetAside assessed = Assess({17, 302, 511, 730, 991});
   EXPECT_FALSE(assessed.is_finding);

@@ -186,6 +186,7 @@ class LadderBuilder {
     const bool as_given = given != nullptr && rms_m < kSameSurface * given->values[0];
     if (as_given || support.IsSurface()) {
       left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
+      ladder_.surface_as_given = as_given;
       if (as_given) return absl::OkStatus();
       if (given == nullptr)
         return AddSurfaceStep(workspace_, selection_, support, left_.lack_of_fit_p, &ladder_);

@@ -28,6 +28,7 @@ struct Ladder {
 
   model::Model improved;             // the initial model with steps and refits, without a formula
   bool changed = false;              // improved differs from the initial model
+  bool surface_as_given = false;     // the model says that surfaces are as wrong as they are
   bool values_wrong = false;         // an effect of the initial model, other than noise, has other values
   std::vector<double> residuals;     // of the improved model, all touches, s
   touches::Prediction prediction;    // of the improved model, with details

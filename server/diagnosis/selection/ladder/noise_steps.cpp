@@ -221,7 +221,7 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   const touches::DeclaredNoise declared = DeclaredNoiseOf(given);
   const bool level_alone = !declared.slope && !declared.degrees_of_freedom && !declared.length_sigma_m &&
                            declared.channel_sigma_s.empty();
-  const bool judged = level_alone || !in_time;
+  const bool judged = level_alone || !(in_time || noise.shape_hidden);
   if (judged && sigma.absent)
     writer.Remove(model::EffectRole::kNoiseLevel);
   else if (judged && scatter &&

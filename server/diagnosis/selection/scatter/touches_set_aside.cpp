@@ -12,6 +12,8 @@ namespace {
 
 using engine::Division;
 
+constexpr int kSlips = 3;  // readings
+
 // Which of `count` values is largest in size; -1: none is finite.
 int LargestOf(const double* values, int count) {
   int largest = -1;
@@ -54,7 +56,7 @@ engine::SetAside AssessTouchesSetAside(const touches::Observations& o, const std
     faces.group.push_back(face % 2 == 1 ? face - 1 : face + 1);
     fingers.group.push_back(LargestOf(&residuals[static_cast<size_t>(k) * o.fingers], o.fingers));
   }
-  return engine::AssessSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches");
+  return engine::AssessSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches", kSlips);
 }
 
 }  // namespace touchstone::diagnosis::selection

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kExcludedNats = 5;  // loss that rules a declared value out
 constexpr size_t kMinDelays = 20;
-constexpr double kMinMissed = 0.002;  // share of the readings: less is no property of the rig
+constexpr double kHiddenShare = 0.25;  // of the variance that is the ticks': the rest's shape does not show
+constexpr double kMinMissed = 0.002;   // share of the readings: less is no property of the rig
 
 NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<double>& declared_s) {
   NoiseEstimate found;
@@ -136,6 +137,12 @@ NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof, const D
   // Polling adds the scatter of the ticks.
   if (found.poll_interval_s.gain_nats > 0) {
     const double tick = found.poll_interval_s.value;
+    found.shape_hidden = tick * tick / 12 > kHiddenShare * found.sigma_s.value * found.sigma_s.value;
+    if (found.shape_hidden) {
+      for (NoiseEstimate* kind : {&found.slope, &found.degrees_of_freedom, &found.length_sigma_m})
+        kind->absent = false;
+      found.channels_absent = false;
+    }
     const double variance = found.sigma_s.value * found.sigma_s.value - tick * tick / 12;
     found.sigma_s.value = variance > 0 ? std::sqrt(variance) : 0;
     if (found.sigma_s.value < 0.1 * tick) found.sigma_s.value = 0;

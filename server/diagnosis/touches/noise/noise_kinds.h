@@ -53,7 +53,9 @@ struct NoiseFindings {
   // By channel, s, of what its noise has beyond sigma_s, in quadrature: EffectRole::kNoiseByFinger. Empty: all alike.
   std::vector<NoiseEstimate> channel_sigma_s;
   bool channels_absent = false;
-  NoiseModel model;             // that describes the residuals best
+  bool shape_hidden =
+      false;         // ticks make so much of the scatter that kinds which a model declares cannot be judged
+  NoiseModel model;  // that describes the residuals best
   std::vector<int> outliers;    // indices of groups with a reading that no noise of the others explains
   std::vector<double> weights;  // by index: what a group should count for in a fit; empty: all the same
 };
