@@ -98,16 +98,15 @@ TEST(HonestReport, SetsOneWildReadingAsideAndNamesIt) {
   rig.hidden = {{"tip_radius", {"radius_mm=2"}}};
   const DiagnosisInput input = touches::MakeTestInput(rig);
   const report::Diagnosis whole = Diagnosed(input);
-  ASSERT_EQ(whole.steps.size(), 2u);  // and its noise
-  for (const double late_s : {0.6, 3.0, 20.0, 1000.0}) {
+  ASSERT_EQ(whole.steps.size(), 1u);
+  for (const double late_s : {0.6, 3.0, 1000.0}) {
     const report::Diagnosis diagnosis = Diagnosed(
         Spoilt(input, [late_s](session::MeasurementSet* set) { set->time_s[3 * 7 + 1] += late_s; }));
     EXPECT_EQ(diagnosis.verdict, engine::Verdict::kMissingEffects) << late_s << ": " << diagnosis.summary;
-    ASSERT_EQ(diagnosis.steps.size(), 2u) << late_s;
+    ASSERT_EQ(diagnosis.steps.size(), 1u) << late_s;
     EXPECT_EQ(diagnosis.steps[0].effect, "tip_radius");
-    EXPECT_EQ(diagnosis.steps[1].effect, whole.steps[1].effect);
     EXPECT_NEAR(diagnosis.data[0].reducible_share, whole.data[0].reducible_share, 0.05) << late_s;
-    EXPECT_EQ(diagnosis.data[0].set_aside.count, whole.data[0].set_aside.count + 1) << late_s;
+    EXPECT_EQ(diagnosis.data[0].set_aside.count(), whole.data[0].set_aside.count() + 1) << late_s;
   }
 }
 

@@ -180,12 +180,13 @@ absl::StatusOr<touches::NoiseFindings> NoiseOf(const Workspace& workspace, const
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
 // count less. Returns whether anything changed; `weights`: by row of the set.
 absl::StatusOr<bool> ReviseTouches(const engine::Fit& fit, const touches::NoiseFindings& noise,
-                                   Workspace* workspace, std::vector<double>* weights) {
+                                   const std::vector<int>& outliers, Workspace* workspace,
+                                   std::vector<double>* weights) {
   touches::Observations& o = *workspace->observations;
   TOUCHSTONE_ASSIGN_OR_RETURN(const int edges, LeaveOutEdges(*workspace->predictor, fit.model.base(), &o));
   const bool reweigh = weights->empty() && !noise.weights.empty();
-  if (edges == 0 && noise.outliers.empty() && !reweigh) return false;
-  for (const int k : noise.outliers) touches::LeaveOut(&o, k, touches::kOutlierReason);
+  if (edges == 0 && outliers.empty() && !reweigh) return false;
+  for (const int k : outliers) touches::LeaveOut(&o, k, touches::kOutlierReason);
   weights->clear();
   if (noise.weights.empty()) return true;
   weights->assign(o.set->size(), 1.0);
@@ -261,8 +262,9 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
     if (pass + 1 == kPasses) break;
+    const std::vector<int>& outliers = pass == 0 ? result.noise.farthest_outliers : result.noise.outliers;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised,
-                                ReviseTouches(result.fit, result.noise, workspace, &weights));
+                                ReviseTouches(result.fit, result.noise, outliers, workspace, &weights));
     if (!revised) break;
     before = result.without_formula.model;
   }

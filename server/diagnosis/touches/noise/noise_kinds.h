@@ -56,7 +56,9 @@ struct NoiseFindings {
   bool shape_hidden =
       false;         // ticks make so much of the scatter that kinds which a model declares cannot be judged
   NoiseModel model;  // that describes the residuals best
-  std::vector<int> outliers;    // indices of groups with a reading that no noise of the others explains
+  std::vector<int> outliers;  // indices of groups with a reading that no noise of the others explains
+  // Those of them that are about as far off as the farthest: a fit that has followed one makes its repeats look like others.
+  std::vector<int> farthest_outliers;
   std::vector<double> weights;  // by index: what a group should count for in a fit; empty: all the same
 };
 

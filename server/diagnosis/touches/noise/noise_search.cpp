@@ -70,6 +70,23 @@ double MedianSigma(const std::vector<ReadingGroup>& groups, const NoiseModel& mo
   return *middle > 0 ? *middle / kMedianOfNormal : model.sigma_s;
 }
 
+// Groups with a reading that is more likely an outlier than not.
+void FindOutliers(const std::vector<ReadingGroup>& groups, const NoiseModel& model, NoiseFindings* found) {
+  constexpr double kBeside = 0.6;
+  std::vector<double> off;  // in scales
+  for (const ReadingGroup& group : groups) {
+    if (OutlierProbability(group, model) <= 0.5) continue;
+    found->outliers.push_back(group.index);
+    off.push_back(0);
+    for (size_t i = 0; i < group.residual_s.size(); ++i)
+      off.back() = std::max(off.back(), std::abs(group.residual_s[i]) / RelativeScale(group, i, model));
+  }
+  if (off.empty()) return;
+  const double farthest = *std::max_element(off.begin(), off.end());
+  for (size_t j = 0; j < off.size(); ++j)
+    if (off[j] > kBeside * farthest) found->farthest_outliers.push_back(found->outliers[j]);
+}
+
 }  // namespace
 
 NoiseSearch::NoiseSearch(const NoiseSample& sample, const DeclaredNoise& declared, NoiseFindings* found)
@@ -318,9 +335,7 @@ void NoiseSearch::Run() {
     const Description with_kinds = any_kind ? WithTails(best_) : tails_alone;
     best_ = any_kind && Score(with_kinds) > Score(tails_alone) ? with_kinds : std::move(tails_alone);
     if (!best_.gaussian()) DropKindsThatTailsExplain();
-    if (best_.model.shape == NoiseShape::kMixture)
-      for (const ReadingGroup& group : sample_.groups)
-        if (OutlierProbability(group, best_.model) > 0.5) found_->outliers.push_back(group.index);
+    if (best_.model.shape == NoiseShape::kMixture) FindOutliers(sample_.groups, best_.model, found_);
   }
   JudgeDeclaredTails();
   JudgeDeclaredScales();
