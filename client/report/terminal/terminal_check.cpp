@@ -16,7 +16,9 @@ namespace {
 
 using TextCell = TextLayout::Cell;
 
-constexpr double kPower = 0.8;     // that found_from and told_from mean
+constexpr double kSometimes =
+    0.1;                        // power at the usual size, from which an effect is no blind spot at any size
+constexpr double kPower = 0.8;  // that found_from and told_from mean
 constexpr int kWideColumns = 100;  // from where what rigs show has a column
 constexpr double kTied = 0.9995;   // correlation
 
@@ -107,8 +109,11 @@ void AddBlindSpots(const v1::Report& report, TextLayout* out) {
   for (const std::string& effect : order) {
     const v1::DetectableEffect& value = *best[effect];
     if (value.power_at_typical() >= kPower) continue;
-    blind.push_back(value.has_found_from() ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
-                                           : absl::StrCat(effect, " at any size"));
+    blind.push_back(
+        value.has_found_from() ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
+        : value.power_at_typical() >= kSometimes
+            ? absl::StrCat(effect, " for sure (", Share(value.power_at_typical()), " at the usual size)")
+            : absl::StrCat(effect, " at any size"));
   }
   if (blind.empty()) return;
   out->Label("Blind to");

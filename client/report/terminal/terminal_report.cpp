@@ -98,9 +98,9 @@ void AddSession(const v1::Report& report, TextLayout* out) {
       smallest = std::min({smallest, finger.p(), finger.p_after()});
   out->Label("Session");
   if (smallest > kSessionP) {
-    out->Paragraph(absl::StrCat("No finger's error changes with ", CovariateName(curves[0]->covariate()),
-                                curves.size() > 1 ? " or the touch's number" : "", " (p ",
-                                Probability(smallest), " at least)."));
+    out->Paragraph(absl::StrCat(
+        "No finger's error shows a change with ", CovariateName(curves[0]->covariate()),
+        curves.size() > 1 ? " or the touch's number" : "", " (p ", Probability(smallest), " at least)."));
     return;
   }
   std::vector<std::vector<TextCell>> rows = {{{"against"}}};

@@ -9,7 +9,7 @@
 namespace touchstone::diagnosis::engine {
 namespace {
 
-constexpr double kAgreeErrors = 2.5;  // standard errors between fingers that agree
+constexpr double kAgreeErrors = 1.5;  // standard errors between fingers that agree
 constexpr double kDifferErrors = 6;   // ... between one that differs and their mean
 
 std::string Objects(const std::string& only, bool per_object) {
@@ -45,7 +45,8 @@ std::string FingerInWords(const Fit& fit, int index) {
       fit.model.base().fingers < 3)
     return "";
   const std::string only = OnlyFinger(fit.model.Describe(index, fit.point, fit.covariance));
-  return only.empty() ? "" : absl::StrCat("Acts on finger ", only, " only: the others agree.");
+  return only.empty() ? ""
+                      : absl::StrCat("Acts on finger ", only, " only: the others agree within their errors.");
 }
 
 }  // namespace

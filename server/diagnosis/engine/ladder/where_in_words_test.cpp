@@ -54,8 +54,10 @@ TEST(WhereInWords, SaysNothingOfAnEffectOfTheRig) {
 
 TEST(WhereInWords, NamesTheOneFingerThatDiffers) {
   EXPECT_EQ(WhereInWords(LengthsMm(-0.1, 0.2, -0.1), SelectedStep()),
-            "Acts on finger m only: the others agree.");
+            "Acts on finger m only: the others agree within their errors.");
   EXPECT_EQ(WhereInWords(LengthsMm(-0.3, 0.2, 0.1), SelectedStep()), "");
+  // Two that may differ do not agree, though their errors allow it.
+  EXPECT_EQ(WhereInWords(LengthsMm(0.005, -0.001, -0.004), SelectedStep()), "");
 }
 
 }  // namespace
