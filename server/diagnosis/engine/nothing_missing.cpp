@@ -12,6 +12,7 @@ namespace {
 
 // Kinds draw from one seed: a draw of one goes with a draw of another index of the next.
 constexpr int kDrawsApart = 37;
+constexpr double kMinDegrees = 2;  // clusters beyond the values that they would explain
 
 // A value per group.
 Eigen::MatrixXd OnEachGroup(const ObservationModel& rows, const Eigen::MatrixXd& columns) {
@@ -60,24 +61,30 @@ void LinearHypotheses::AddEffects(const ObservationModel& rows, const std::vecto
   }
 }
 
-double LinearHypotheses::Overdispersion(const Basis& basis, const Eigen::VectorXd& residual,
-                                        double variance) const {
-  const Eigen::VectorXd left =
-      residual.segment(basis.first_row, basis.columns.rows()) -
-      basis.columns * (basis.columns.transpose() * residual.segment(basis.first_row, basis.columns.rows()));
-  double squares = 0;
+LinearHypotheses::Parts LinearHypotheses::PartsOf(const Basis& basis) const {
+  Parts parts;
   for (size_t c = 0; c + 1 < clusters_.size(); ++c) {
     const int first = std::max(clusters_[c] - basis.first_row, 0);
     const int rows = std::min<int>(clusters_[c + 1] - basis.first_row, basis.columns.rows()) - first;
-    if (rows > 0)
-      squares +=
-          (basis.columns.middleRows(first, rows).transpose() * left.segment(first, rows)).squaredNorm();
+    if (rows > 0 && !basis.columns.middleRows(first, rows).isZero()) parts.emplace_back(first, rows);
   }
-  return std::max(squares / (variance * static_cast<double>(basis.columns.cols())), 1.0);
+  return parts;
+}
+
+double LinearHypotheses::Overdispersion(const Basis& basis, const Parts& parts,
+                                        const Eigen::VectorXd& residual, double variance) {
+  const auto own = residual.segment(basis.first_row, basis.columns.rows());
+  const Eigen::VectorXd left = own - basis.columns * (basis.columns.transpose() * own);
+  double squares = 0;
+  for (const auto& [first, rows] : parts)
+    squares += (basis.columns.middleRows(first, rows).transpose() * left.segment(first, rows)).squaredNorm();
+  // What the columns have followed is given back.
+  const double clusters = static_cast<double>(parts.size()), rank = static_cast<double>(basis.columns.cols());
+  return std::max(squares / (variance * rank) * clusters / (clusters - rank), 1.0);
 }
 
 Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) const {
-  Eigen::MatrixXd p_values(size(), residuals.cols());
+  Eigen::MatrixXd p_values = Eigen::MatrixXd::Ones(size(), residuals.cols());
   const Eigen::RowVectorXd all = residuals.colwise().squaredNorm();
   for (int h = 0; h < size(); ++h) {
     const Basis& basis = bases_[h];
@@ -87,11 +94,13 @@ Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) cons
             .squaredNorm();
     const double rank = static_cast<double>(basis.columns.cols());
     const double left = static_cast<double>(residuals.rows()) - eliminated_ - rank;
-    const bool clustered = clusters_.size() > 2;
-    const double degrees = clustered ? static_cast<double>(clusters_.size()) - 2 : left;
+    const Parts parts = PartsOf(basis);
+    const bool clustered = !clusters_.empty();
+    const double degrees = clustered ? static_cast<double>(parts.size()) - rank : left;
+    if (clustered && degrees < kMinDegrees) continue;
     for (int draw = 0; draw < residuals.cols(); ++draw) {
       const double variance = std::max((all[draw] - taken[draw]) / left, 1e-300);
-      const double over = clustered ? Overdispersion(basis, residuals.col(draw), variance) : 1;
+      const double over = clustered ? Overdispersion(basis, parts, residuals.col(draw), variance) : 1;
       p_values(h, draw) = FisherTail(taken[draw] / rank / (variance * over), rank, degrees);
     }
   }
@@ -107,6 +116,21 @@ Eigen::MatrixXd DataAndNoise(const ObservationModel& rows, const Eigen::VectorXd
     for (int row = 0; row < residual.size(); ++row) columns(row, draw) = random.Normal();
   }
   columns.rightCols(draws) = rows.WithoutEliminated(columns.rightCols(draws));
+  return columns;
+}
+
+Eigen::MatrixXd DataAndTurned(const Eigen::VectorXd& residual, const std::vector<int>& clusters,
+                              uint64_t seed, int draws) {
+  Eigen::MatrixXd columns(residual.size(), 1 + draws);
+  columns.col(0) = residual;
+  for (int draw = 1; draw <= draws; ++draw) {
+    RandomStream random(seed, RandomDomain::kDiagnosis, draw);
+    for (size_t c = 0; c + 1 < clusters.size(); ++c) {
+      const int rows = clusters[c + 1] - clusters[c];
+      columns.col(draw).segment(clusters[c], rows) =
+          (random.Uniform() < 0.5 ? -1.0 : 1.0) * residual.segment(clusters[c], rows);
+    }
+  }
   return columns;
 }
 

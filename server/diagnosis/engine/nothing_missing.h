@@ -40,7 +40,7 @@ class LinearHypotheses {
   int size() const { return static_cast<int>(bases_.size()); }
 
   // p value of each hypothesis (rows) for each draw (columns of `residuals`): F test of what the columns take off. With clusters the
-  // noise of what they take is that which differs from cluster to cluster, where it is more than rows that err independently make.
+  // noise of what they take is that which differs from cluster to cluster, where it is more than rows that err independently make; p is 1 where clusters are too few to say.
   Eigen::MatrixXd PValues(const Eigen::MatrixXd& residuals) const;
 
  private:
@@ -48,8 +48,12 @@ class LinearHypotheses {
     Eigen::MatrixXd columns;  // orthonormal
     int first_row = 0;
   };
+  using Parts = std::vector<std::pair<int, int>>;  // first row within the basis, rows
+  // Of the clusters that a basis has rows in.
+  Parts PartsOf(const Basis& basis) const;
   // By how much what a basis takes off `residual` scatters more from cluster to cluster than rows of this variance make it.
-  double Overdispersion(const Basis& basis, const Eigen::VectorXd& residual, double variance) const;
+  static double Overdispersion(const Basis& basis, const Parts& parts, const Eigen::VectorXd& residual,
+                               double variance);
 
   std::vector<Basis> bases_;
   int eliminated_ = 0;
@@ -59,6 +63,11 @@ class LinearHypotheses {
 // Columns: `residual`, then what noise alone leaves of these rows, of variance 1 in each direction that they have.
 Eigen::MatrixXd DataAndNoise(const ObservationModel& rows, const Eigen::VectorXd& residual, uint64_t seed,
                              int draws = kNoiseDraws);
+
+// Columns: `residual` of a model that nothing was fitted of, then the same with the signs of whole clusters turned at random, which
+// says nothing else where errors of clusters are independent and as often above as below. `clusters` as of LinearHypotheses.
+Eigen::MatrixXd DataAndTurned(const Eigen::VectorXd& residual, const std::vector<int>& clusters,
+                              uint64_t seed, int draws = kNoiseDraws);
 
 // p values of statistics (hypotheses x draws, in any unit) of which draws 1, 2, ... show mean and spread: either tail.
 Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics);
