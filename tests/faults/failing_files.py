@@ -105,7 +105,7 @@ COMMANDS = (
     Command("picture, depth and mask", ("capture", "lat20", "--approach", "0,0,-1", "--image", "32x32", "--depth", "--mask", "--renderer",
                                         "cpu", "-o", "OUT/side.png")),
     Command("reports", ("compare", "IN/set.csv", "--model", "IN/model.yaml", "--html", "OUT/report.html", "--json", "OUT/report.json")),
-    Command("Python's measurements", ("from touchstone import measurements as m; m.write_measurements('OUT/set.csv', m.read_plan('IN/plan.csv'))",),
+    Command("Python's measurements", ("from touchstone import measurements as m; m.write_measurements('OUT/set.csv', m.read_plan('IN/plan.csv'), force=True)",),
             python=True),
     Command("diagnosis", ("diagnose", "IN/set.csv", "--model", "IN/model.yaml", "--save-model", "OUT/found.yaml", "--html",
                           "OUT/report.html", "--json", "OUT/report.json")),
