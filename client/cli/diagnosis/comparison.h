@@ -117,6 +117,9 @@ class Comparison {
   std::vector<source::MeshSpec> meshes_;  // files that were read
 };
 
+// A refusal of one of these names of an effect, with the effect of the catalogue that was probably meant.
+absl::Status WithEffectHint(const absl::Status& status, const std::vector<std::string>& names);
+
 // The report as JSON and as HTML, as the options ask.
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
 // The same, and the report in words unless one of them went to standard output.

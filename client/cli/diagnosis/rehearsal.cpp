@@ -87,8 +87,8 @@ absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, 
   for (const std::string& name : only)
     if (std::find(names.begin(), names.end(), name) == names.end())
       return absl::InvalidArgumentError(
-          absl::StrCat("--effects: '", name, "' is no effect that this model lacks and touches can show; ",
-                       absl::StrJoin(names, ", "), " are"));
+          absl::StrCat("--effects: '", name, "' is no effect that this model lacks and touches can show",
+                       DidYouMean(name, names)));
   if (!only.empty()) names = only;
   if (size.found)  // what is never found has no such size
     names.erase(
