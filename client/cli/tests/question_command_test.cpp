@@ -149,7 +149,8 @@ TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
   EXPECT_THAT(message({"--find", "tip_radius"}), HasSubstr("belong to --improve"));
   EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}),
               HasSubstr("'tip_radios'"));
-  EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise: -5 us is out of range; above 0 to 1000000 us was expected"));
+  EXPECT_THAT(message({"--noise", "-5"}),
+              HasSubstr("--noise: -5 us is out of range; above 0 to 1000000 us was expected"));
   Write("silent.yaml", "touchstone: model/1\nname: silent\nend_effector: {fingers: 3, spacing_mm: 30}\n");
   const Outcome silent = Run({"check", "plan.csv", "--model", "silent.yaml"});
   EXPECT_THAT(silent.err, AllOf(HasSubstr("'silent' has no noise"), HasSubstr("--noise 5")));
