@@ -112,5 +112,5 @@ def test_what_takes_the_place_of_touches_or_a_model_is_named(client, measured, t
         client.touch("lat20", [])
     monkeypatch.chdir(tmp_path)
     (tmp_path / "set.csv").write_bytes(measured.read_bytes())
-    with pytest.raises(touchstone.InvalidRequest, match="model: 'set.csv' is a file, but no model file"):
+    with pytest.raises(touchstone.InvalidRequest, match="is a file, but no model file"):
         client.diagnose("set.csv", "set.csv")
