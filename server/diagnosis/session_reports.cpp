@@ -9,6 +9,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/answers/early_verdicts.h"
+#include "server/diagnosis/answers/session_copies.h"
 #include "server/diagnosis/answers/session_poses.h"
 #include "server/diagnosis/answers/session_posterior.h"
 #include "server/diagnosis/answers/uncertainty_reports.h"
@@ -43,7 +44,7 @@ absl::Status CheckSessions(const std::vector<DiagnosisInput>& sessions) {
           input.set->origin, ": has times of ", input.set->fingers, " fingers, and ", sessions[0].set->origin,
           " of ", sessions[0].set->fingers, "; sessions of one rig were expected"));
   }
-  return absl::OkStatus();
+  return CheckCopies(sessions);
 }
 
 class SessionsReporter {

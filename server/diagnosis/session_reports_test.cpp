@@ -150,6 +150,21 @@ TEST(Sessions, ASessionWithTooFewTouchesTakesNoPart) {
   EXPECT_EQ(two.verdict, Verdict::kTooLittleData) << two.summary;
 }
 
+TEST(Sessions, AMeasurementThatIsGivenTwiceIsRefusedWithBothNames) {
+  std::vector<DiagnosisInput> inputs = SessionInputs({SessionRig(1, {}), SessionRig(2, {})});
+  // Half of the second day's times are those of the first day.
+  auto copy = std::make_shared<session::MeasurementSet>(*inputs[1].set);
+  std::copy_n(inputs[0].set->time_s.begin(), copy->time_s.size() / 2, copy->time_s.begin());
+  for (const auto& set : {inputs[0].set, std::shared_ptr<const session::MeasurementSet>(copy)}) {
+    inputs[1].set = set;
+    for (const absl::Status& status : {Diagnose(inputs, {}).status(), Compare(inputs, {}).status()}) {
+      EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+      EXPECT_NE(status.message().find("day1.csv"), absl::string_view::npos) << status;
+      EXPECT_NE(status.message().find(set->origin), absl::string_view::npos) << status;
+    }
+  }
+}
+
 TEST(Sessions, OtherFingersAreNoSessionOfTheRig) {
   std::vector<DiagnosisInput> inputs = SessionInputs({SessionRig(1, {}), SessionRig(2, {})});
   auto set = std::make_shared<session::MeasurementSet>(*inputs[1].set);

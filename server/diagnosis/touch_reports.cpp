@@ -284,8 +284,9 @@ absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
   ProgressGate gate(context);
   DiagnosisContext gated = context;
   gated.progress = [&gate](const std::string& stage, double done) { return gate.Enter(stage, done); };
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
-                              selection::MakeWorkspace(input, gated));
+  auto made = selection::MakeWorkspace(input, gated);
+  if (!made.ok()) return WithFix(made.status(), input, gated);
+  const std::unique_ptr<selection::Workspace> workspace = *std::move(made);
   if (!gate.Enter("comparing", 0.3)) return absl::CancelledError(kCancelled);
   const touches::Observations& o = *workspace->observations;
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);

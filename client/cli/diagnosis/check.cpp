@@ -9,9 +9,13 @@
 #include "client/cli/diagnosis/proposed_touches.h"
 #include "client/report/report.h"
 #include "server/base/status.h"
+#include "server/base/text/text.h"
 
 namespace touchstone::cli {
 namespace {
+
+// A second; no sensor scatters so much that another would be of use.
+constexpr double kMaxNoiseUs = 1e6;
 
 struct CheckOptions : ComparisonOptions {
   std::optional<double> noise_us;
@@ -20,9 +24,10 @@ struct CheckOptions : ComparisonOptions {
 };
 
 absl::Status CheckQuestion(const CheckOptions& options) {
-  if (options.noise_us && !(*options.noise_us > 0 && std::isfinite(*options.noise_us)))
-    return absl::InvalidArgumentError(
-        absl::StrCat("--noise: ", *options.noise_us, "; a positive number of us was expected"));
+  if (options.noise_us && !(*options.noise_us > 0 && *options.noise_us <= kMaxNoiseUs))
+    return absl::InvalidArgumentError(absl::StrCat("--noise: ", ShortestNumber(*options.noise_us),
+                                                   " us is out of range; above 0 to ",
+                                                   static_cast<int>(kMaxNoiseUs), " us was expected"));
   const bool asked = !options.find.empty() || !options.between.empty();
   if (options.improve > 0 && options.output.empty())
     return absl::InvalidArgumentError("--improve: -o FILE was expected, where the touches are written");
@@ -49,11 +54,15 @@ absl::Status RunCheck(const Cli& cli, const CheckOptions& options) {
   if (!options.between.empty())
     for (const absl::string_view effect : absl::StrSplit(options.between, ','))
       request.add_between(std::string(effect));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::CheckResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                return comparison->connection().diagnosis().Check(context, request);
-                              }));
+  const absl::StatusOr<v1::Report> checked =
+      comparison->Run<v1::CheckResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        return comparison->connection().diagnosis().Check(context, request);
+      });
+  std::vector<std::string> asked = {request.between().begin(), request.between().end()};
+  asked.push_back(options.find);
+  if (!checked.ok()) return WithEffectHint(checked.status(), asked);
+  const v1::Report& report = *checked;
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (!options.ReportOnStdout())
     TOUCHSTONE_RETURN_IF_ERROR(cli.Print(client::TerminalCheck(report, TerminalWidth(), ColourOnStdout())));

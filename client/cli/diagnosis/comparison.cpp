@@ -120,8 +120,11 @@ absl::StatusOr<std::unique_ptr<Comparison>> Comparison::Open(const Cli& cli,
   }
   for (const std::string& path : options.also) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path, kMaxTermsBytes));
-    TOUCHSTONE_RETURN_IF_ERROR(
-        model::ParseModel(service::AsModelFile(text), path, effects::Catalogue()).status());
+    TOUCHSTONE_ASSIGN_OR_RETURN(const model::Model terms,
+                                model::ParseModel(service::AsModelFile(text), path, effects::Catalogue()));
+    if (terms.effects.empty())
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--also: ", path, " has no effects; a file of formulas that may be missing was expected"));
     evidence.add_also_yaml(text);
   }
   std::vector<NamedSet> sets;
@@ -315,11 +318,20 @@ absl::Status Comparison::SendSession(v1::Sessions::StubInterface* sessions, cons
   }
   writer->WritesDone();
   const absl::Status status = client::FromGrpc(writer->Finish());
-  if (status.ok()) return status;
-  // The server knows the set by the passing name only.
-  std::string message(status.message());
-  if (absl::StartsWith(message, name)) message = evidence_.origin() + message.substr(name.size());
-  return absl::Status(status.code(), message);
+  return WithFile(status, name, evidence_.origin());
+}
+
+absl::Status WithEffectHint(const absl::Status& status, const std::vector<std::string>& names) {
+  std::vector<std::string> known;
+  for (const auto& effect : effects::TouchEffects()) known.push_back(effect->name);
+  for (const std::string& name : names) {
+    const std::string hint = DidYouMean(name, known);
+    if (!absl::StartsWith(status.message(), absl::StrCat("'", name, "' is no effect")) ||
+        !absl::StrContains(hint, "did you mean '") || std::count(known.begin(), known.end(), name) > 0)
+      continue;
+    return absl::Status(status.code(), absl::StrCat("'", name, "' is no effect", hint));
+  }
+  return status;
 }
 
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report) {

@@ -81,15 +81,16 @@ class Comparison {
   absl::Status SendAheadAgain(const std::shared_ptr<grpc::Channel>& server) const;
 
   // Runs the call that `start` makes; shows progress; returns the report with its provenance. Ctrl-C cancels it. A lost server
-  // is replaced by the next one, which begins anew.
+  // is replaced by the next one, which begins anew. With `after_report` a report is returned although the call failed once it had
+  // been sent, and there stands why.
   template <typename Response, typename Start>
-  absl::StatusOr<v1::Report> Run(const Start& start) {
+  absl::StatusOr<v1::Report> Run(const Start& start, absl::Status* after_report = nullptr) {
     ProgressBar bar(!cli_.output().quiet);
-    return Run<Response>(start, &bar);
+    return Run<Response>(start, &bar, after_report);
   }
   // The same on a bar that shows more than this call.
   template <typename Response, typename Start>
-  absl::StatusOr<v1::Report> Run(const Start& start, ProgressBar* bar);
+  absl::StatusOr<v1::Report> Run(const Start& start, ProgressBar* bar, absl::Status* after_report = nullptr);
 
  private:
   explicit Comparison(const Cli& cli) : cli_(cli) {}
@@ -102,7 +103,7 @@ class Comparison {
   absl::Status SendSession(v1::Sessions::StubInterface* sessions, const std::string& name,
                            grpc::ClientContext* context) const;
   template <typename Response, typename Start>
-  absl::StatusOr<v1::Report> Attempt(const Start& start, ProgressBar* bar);
+  absl::StatusOr<v1::Report> Attempt(const Start& start, ProgressBar* bar, absl::Status* after_report);
 
   const Cli& cli_;
   std::unique_ptr<client::Connection> connection_;
@@ -116,13 +117,17 @@ class Comparison {
   std::vector<source::MeshSpec> meshes_;  // files that were read
 };
 
+// A refusal of one of these names of an effect, with the effect of the catalogue that was probably meant.
+absl::Status WithEffectHint(const absl::Status& status, const std::vector<std::string>& names);
+
 // The report as JSON and as HTML, as the options ask.
 absl::Status WriteReportFiles(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
 // The same, and the report in words unless one of them went to standard output.
 absl::Status PrintReport(const Cli& cli, const ComparisonOptions& options, const v1::Report& report);
 
 template <typename Response, typename Start>
-absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* bar) {
+absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* bar,
+                                               absl::Status* after_report) {
   bar->ShowStage("sending the measurements", 0);
   TOUCHSTONE_RETURN_IF_ERROR(SendAheadNow());
   grpc::ClientContext context;
@@ -142,16 +147,20 @@ absl::StatusOr<v1::Report> Comparison::Attempt(const Start& start, ProgressBar* 
   if (!Interrupt::Raised()) status = client::LostWhereCancelled(status);
   // Another server does not have it.
   if (client::IsLostServer(status)) sent_ahead_.clear();
+  if (reported && after_report != nullptr) {
+    *after_report = status;
+    return report;
+  }
   if (!status.ok()) return status;
   if (!reported) return absl::InternalError("the source ended without a report");
   return report;
 }
 
 template <typename Response, typename Start>
-absl::StatusOr<v1::Report> Comparison::Run(const Start& start, ProgressBar* bar) {
+absl::StatusOr<v1::Report> Comparison::Run(const Start& start, ProgressBar* bar, absl::Status* after_report) {
   absl::StatusOr<v1::Report> report;
   TOUCHSTONE_RETURN_IF_ERROR(connection_->Retrying([&] {
-    report = Attempt<Response>(start, bar);
+    report = Attempt<Response>(start, bar, after_report);
     return report.status();
   }));
   AddClientProvenance(cli_.command_line(), set_sha256_, meshes_, &*report);

@@ -1,4 +1,6 @@
 // touchstone diagnose: how wrong a model is, where, why, what to add, and what the error becomes.
+#include <absl/strings/strip.h>
+
 #include "client/cli/diagnosis/board.h"
 #include "client/cli/diagnosis/comparison.h"
 #include "client/cli/options/model_output.h"
@@ -48,6 +50,17 @@ absl::Status SaveModel(const Cli& cli, const DiagnoseOptions& options, const v1:
   return absl::OkStatus();
 }
 
+// Before hours of work: that the server has no model of that name.
+absl::Status CheckKeepAs(const DiagnoseOptions& options, Comparison* comparison) {
+  v1::GetModelRequest request;
+  request.mutable_model()->set_name(options.keep_as);
+  const absl::StatusOr<v1::Model> taken = comparison->connection().Call(&v1::Models::Stub::GetModel, request);
+  if (!taken.ok()) return absl::OkStatus();  // what else is wrong with the name, the diagnosis says at once
+  return absl::AlreadyExistsError(absl::StrCat("--keep-as: the server has a model '", options.keep_as,
+                                               "' already (hash ", taken->hash().substr(0, 12),
+                                               "); give another name"));
+}
+
 absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
   if (options.sets.size() > 1) {
     for (const auto& [given, name] : {std::pair{options.with_formula, "--with-formula"},
@@ -87,18 +100,30 @@ absl::Status RunDiagnose(const Cli& cli, const DiagnoseOptions& options) {
     TOUCHSTONE_RETURN_IF_ERROR(
         cli.CheckOutputs({{"--with-surface-map", SurfaceMapPath(options.save_model)}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
+  if (!options.keep_as.empty()) TOUCHSTONE_RETURN_IF_ERROR(CheckKeepAs(options, comparison.get()));
   v1::DiagnoseRequest request;
+  absl::Status kept;
   request.set_with_surface_map(options.with_surface_map);
   request.set_save_model(options.keep_as);
   TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::Report report, comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-        *request.mutable_evidence() = comparison->evidence();
-        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
-        return comparison->connection().diagnosis().Diagnose(context, request);
-      }));
+      const v1::Report report,
+      comparison->Run<v1::DiagnoseResponse>(
+          [&](grpc::ClientContext* context) {
+            *request.mutable_evidence() = comparison->evidence();
+            *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+            return comparison->connection().diagnosis().Diagnose(context, request);
+          },
+          &kept));
   TOUCHSTONE_RETURN_IF_ERROR(PrintReport(cli, options, report));
+  if (!options.save_model.empty())
+    TOUCHSTONE_RETURN_IF_ERROR(SaveModel(cli, options, report, comparison.get()));
+  if (!kept.ok())
+    return absl::Status(
+        kept.code(), absl::StrCat("--keep-as: the report is whole, but the server does not keep the model: ",
+                                  absl::StripPrefix(kept.message(), "save_model: "),
+                                  "; write it with --save-model FILE, or diagnose again with another "
+                                  "name"));
   if (!options.keep_as.empty()) cli.Log(absl::StrCat("the server keeps the model as ", options.keep_as));
-  if (!options.save_model.empty()) return SaveModel(cli, options, report, comparison.get());
   return absl::OkStatus();
 }
 

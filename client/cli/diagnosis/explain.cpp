@@ -16,20 +16,25 @@ absl::Status RunExplain(const Cli& cli, const ExplainOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
   v1::ExplainRequest request;
   request.set_effect(options.effect);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::ExplainResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                return comparison->connection().diagnosis().Explain(context, request);
-                              }));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
+  const absl::StatusOr<v1::Report> report =
+      comparison->Run<v1::ExplainResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        return comparison->connection().diagnosis().Explain(context, request);
+      });
+  if (!report.ok()) return WithEffectHint(report.status(), {options.effect});
+  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, *report));
   if (options.ReportOnStdout()) return absl::OkStatus();
-  return cli.Print(client::TerminalExplanation(report, TerminalWidth(), ColourOnStdout()));
+  return cli.Print(client::TerminalExplanation(*report, TerminalWidth(), ColourOnStdout()));
 }
 
 }  // namespace
 
 void AddExplain(Cli* cli) {
   auto options = std::make_shared<ExplainOptions>();
+  options->set_text =
+      "The measurement file (CSV) of touches with poses, or the journal (.db) of a rig's session; -: stdin; "
+      "with "
+      "--server also a stored session's name";
   CLI::App* command = cli->AddCommand(
       nullptr, "explain",
       "Says why one effect is, or is not, what a model lacks: its best value, what it leaves, which touches "

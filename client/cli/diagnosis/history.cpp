@@ -1,5 +1,7 @@
 // touchstone history: every session of a folder, one after another: how wrong the model was in each, and every value over the
 // sessions with the limits that the others let expect.
+#include <absl/strings/match.h>
+
 #include <algorithm>
 #include <filesystem>
 
@@ -53,22 +55,41 @@ absl::StatusOr<std::vector<std::string>> SessionsOf(const Cli& cli, const std::s
   return sessions;
 }
 
+absl::StatusOr<v1::Report> DiagnoseAll(const Cli& cli, const HistoryOptions& options) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
+  v1::DiagnoseRequest request;
+  return comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
+    *request.mutable_evidence() = comparison->evidence();
+    *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
+    return comparison->connection().diagnosis().Diagnose(context, request);
+  });
+}
+
+// The session that `refusal` names; false: it names none.
+bool LeaveOut(const Cli& cli, const absl::Status& refusal, std::vector<std::string>* sessions) {
+  const auto named = std::find_if(sessions->begin(), sessions->end(), [&](const std::string& path) {
+    return absl::StartsWith(refusal.message(), path + ":");
+  });
+  if (named == sessions->end()) return false;
+  cli.Log(absl::StrCat("note: left out: ", refusal.message()));
+  sessions->erase(named);
+  return true;
+}
+
 absl::Status RunHistory(const Cli& cli, HistoryOptions options) {
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--html", options.html}, {"--json", options.json}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(options.sets, SessionsOf(cli, options.folder));
   TOUCHSTONE_RETURN_IF_ERROR(CheckOutputFiles({{"--html", options.html}, {"--json", options.json}},
                                               options.sets, cli.output().force));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
-  v1::DiagnoseRequest request;
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      const v1::Report report, comparison->Run<v1::DiagnoseResponse>([&](grpc::ClientContext* context) {
-        *request.mutable_evidence() = comparison->evidence();
-        *request.mutable_further() = {comparison->further().begin(), comparison->further().end()};
-        return comparison->connection().diagnosis().Diagnose(context, request);
-      }));
-  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
+  absl::StatusOr<v1::Report> report = DiagnoseAll(cli, options);
+  // A session whose object has no mesh stays out as files of another kind do.
+  while (absl::IsNotFound(report.status()) && options.sets.size() > 2 &&
+         LeaveOut(cli, report.status(), &options.sets))
+    report = DiagnoseAll(cli, options);
+  TOUCHSTONE_RETURN_IF_ERROR(report.status());
+  TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, *report));
   if (options.ReportOnStdout()) return absl::OkStatus();
-  return cli.Print(client::TerminalHistory(report, TerminalWidth(), ColourOnStdout()));
+  return cli.Print(client::TerminalHistory(*report, TerminalWidth(), ColourOnStdout()));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // touchstone propose: what to touch, or to photograph, next, to tell the explanations apart that are left.
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/strip.h>
 
 #include <algorithm>
 #include <map>
@@ -55,6 +56,15 @@ struct PlanKind {
   std::string (*format)(const v1::Report& report);
 };
 
+// A limit of the source is on a field of the request; the user typed an option.
+absl::Status InOptions(const absl::Status& status) {
+  for (const auto& [field, option] :
+       {std::pair{"touches = ", "--touches: "}, {"photographs = ", "--photographs: "}})
+    if (absl::string_view text = status.message(); absl::ConsumePrefix(&text, field))
+      return absl::InvalidArgumentError(absl::StrCat(option, text));
+  return status;
+}
+
 absl::Status WritePlan(const Cli& cli, const ProposeOptions& options, const PlanKind& kind,
                        const v1::Report& report) {
   std::map<std::string, int> purposes;
@@ -69,7 +79,13 @@ absl::Status WritePlan(const Cli& cli, const ProposeOptions& options, const Plan
                            ambiguity.discriminating_measurement()));
   TOUCHSTONE_RETURN_IF_ERROR(WriteReportFiles(cli, options, report));
   if (report.next().empty()) {
-    cli.Log(report.data_problems().empty()
+    cli.Log(report.verdict() == v1::Report::TOO_LITTLE_DATA
+                ? absl::StrCat("no ", kind.many, " to propose from so few: more are needed first",
+                               client::MainData(report).needed() > 0
+                                   ? absl::StrCat(" (", client::MainData(report).needed(), " usable ones)")
+                                   : "",
+                               "; touchstone plan writes some")
+            : report.data_problems().empty()
                 ? absl::StrCat("no ", kind.many, " to propose: no explanations are left that further ",
                                kind.many, " would tell apart")
                 : absl::StrCat("no ", kind.many, " to propose before the set is fixed: ", report.summary()));
@@ -88,16 +104,21 @@ absl::Status RunPropose(const Cli& cli, const ProposeOptions& options) {
     return absl::InvalidArgumentError("--photographs: 0 is out of range; 1 or more was expected");
   TOUCHSTONE_RETURN_IF_ERROR(CheckNoMeshes(cli, {{"--json", options.json}, {"-o", options.output}}));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto comparison, Comparison::Open(cli, options));
+  if (options.photographs && comparison->evidence().session().empty() && !comparison->evidence().has_images())
+    return absl::InvalidArgumentError(
+        absl::StrCat("--photographs: ", options.set(), " holds touches alone; --touches N proposes touches"));
   v1::ProposeRequest request;
   request.set_touches(options.touches.value_or(0));
   request.set_photographs(options.photographs.value_or(0));
   const bool both = comparison->evidence().has_images() &&
                     comparison->evidence().measurements_case() != v1::Evidence::MEASUREMENTS_NOT_SET;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const v1::Report report,
-                              comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
-                                *request.mutable_evidence() = comparison->evidence();
-                                return comparison->connection().diagnosis().Propose(context, request);
-                              }));
+  const absl::StatusOr<v1::Report> proposed =
+      comparison->Run<v1::ProposeResponse>([&](grpc::ClientContext* context) {
+        *request.mutable_evidence() = comparison->evidence();
+        return comparison->connection().diagnosis().Propose(context, request);
+      });
+  if (!proposed.ok()) return InOptions(proposed.status());
+  const v1::Report& report = *proposed;
 
   const bool pictures = client::MainData(report).kind() == v1::DataReport::PHOTOGRAPHS;
   if (both)

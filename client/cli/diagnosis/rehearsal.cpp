@@ -87,8 +87,8 @@ absl::StatusOr<std::vector<RehearsedCase>> ListCases(const model::Model& given, 
   for (const std::string& name : only)
     if (std::find(names.begin(), names.end(), name) == names.end())
       return absl::InvalidArgumentError(
-          absl::StrCat("--effects: '", name, "' is no effect that this model lacks and touches can show; ",
-                       absl::StrJoin(names, ", "), " are"));
+          absl::StrCat("--effects: '", name, "' is no effect that this model lacks and touches can show",
+                       DidYouMean(name, names)));
   if (!only.empty()) names = only;
   if (size.found)  // what is never found has no such size
     names.erase(
@@ -179,10 +179,16 @@ RehearsedSet Assess(const RehearsedCase& hidden, const v1::Report& report) {
   AssessChanges(hidden, report, &set);
   const bool checks = report.verdict() == v1::Report::CHECK_DATA;
   set.confident |= checks && !hidden.is_mistake;
+  // What is said to remain, or to have another value, is made up where all that is hidden has a name.
+  const bool is_nothing = hidden.effects.empty() && !hidden.is_mistake && !hidden.is_outside;
+  set.false_claim |= !hidden.is_mistake && !hidden.is_outside && report.verdict() == v1::Report::UNEXPLAINED;
+  set.false_claim |= is_nothing && report.verdict() == v1::Report::WRONG_VALUES;
   if (hidden.is_mistake)
     set.found = set.right = checks;
   else if (hidden.is_outside)
     set.found = set.right = report.verdict() == v1::Report::UNEXPLAINED;
+  else if (is_nothing)
+    set.right = report.verdict() == v1::Report::ADEQUATE && !set.false_claim;
   else
     set.right = set.found && !set.false_claim && !checks;
   return set;

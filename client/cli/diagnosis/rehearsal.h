@@ -54,8 +54,9 @@ struct RehearsedSet {
   bool right =
       false;  // that, and nothing else; ADEQUATE of nothing; CHECK_DATA of a mistake; UNEXPLAINED of what is
               // outside
-  bool false_claim =
-      false;  // a step without a hidden effect, or, of several sessions, a change that was not hidden
+  // A step without a hidden effect; of several sessions a change that was not hidden; UNEXPLAINED where all that is hidden
+  // has a name, and WRONG_VALUES of nothing.
+  bool false_claim = false;
   bool confident = false;  // ... with a probability of at least 0.9, or CHECK_DATA without a mistake
   std::vector<double> z;   // (estimate - truth) / standard error of hidden values that were fitted
   bool left_out = false;   // it could not be hidden: nothing else is known

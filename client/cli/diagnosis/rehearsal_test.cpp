@@ -102,6 +102,26 @@ TEST(AssessSet, OfNothingAnEmptyReportIsRight) {
   EXPECT_FALSE(Assess(Cases()[0], Naming("tip_radius", 1, 0.1, 0.99)).right);
 }
 
+TEST(AssessSet, OfNothingOnlyAdequateIsRight) {
+  v1::Report report;
+  for (const v1::Report::Verdict verdict : {v1::Report::UNEXPLAINED, v1::Report::WRONG_VALUES}) {
+    report.set_verdict(verdict);
+    EXPECT_FALSE(Assess(Cases()[0], report).right);
+    EXPECT_TRUE(Assess(Cases()[0], report).false_claim);
+  }
+  report.set_verdict(v1::Report::TOO_LITTLE_DATA);
+  EXPECT_FALSE(Assess(Cases()[0], report).right);
+  EXPECT_TRUE(Assess(Cases()[0], report).honest());
+}
+
+TEST(AssessSet, UnexplainedIsAFalseClaimUnlessWhatIsHiddenHasNoName) {
+  v1::Report report = Naming("tip_radius", 1.5, 0.05, 0.99);
+  report.set_verdict(v1::Report::UNEXPLAINED);
+  EXPECT_TRUE(Assess(Cases()[1], report).found);
+  EXPECT_FALSE(Assess(Cases()[1], report).right);
+  EXPECT_TRUE(Assess(Cases()[3], report).right);
+}
+
 TEST(AssessSet, CheckDataIsRightForAMistakeAndConfidentlyWrongElse) {
   v1::Report checks;
   checks.set_verdict(v1::Report::CHECK_DATA);

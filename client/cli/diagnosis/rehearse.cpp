@@ -20,7 +20,7 @@ namespace touchstone::cli {
 namespace {
 
 struct RehearseOptions : ComparisonOptions {
-  uint32_t sets = 0;
+  std::optional<uint32_t> sets;
   double minutes = 10;
   std::string size = "1";
   std::string effects;
@@ -146,13 +146,13 @@ class Rehearsal {
     const auto minutes = [&] {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / 60;
     };
-    const size_t wanted = options_.sets > 0 ? options_.sets : SIZE_MAX;
+    const size_t wanted = options_.sets ? *options_.sets : SIZE_MAX;
     ProgressBar bar(!cli_.output().quiet);
     const size_t first = state_.sets().size();
-    for (size_t n = first; n < wanted && (options_.sets > 0 || minutes() < options_.minutes); ++n) {
+    for (size_t n = first; n < wanted && (options_.sets || minutes() < options_.minutes); ++n) {
       const RehearsedCase& hidden = cases_[n % cases_.size()];
       // Of a time that was given, a set is as large a share as those before it were.
-      const double sets = options_.sets > 0 ? options_.sets : 0;
+      const double sets = options_.sets.value_or(0);
       const double share = sets > 0 ? static_cast<double>(n) / sets : minutes() / options_.minutes;
       const double made = static_cast<double>(n - first);
       const double next = sets > 0 ? (static_cast<double>(n) + 1) / sets
@@ -247,6 +247,8 @@ class Rehearsal {
 };
 
 absl::Status RunRehearse(const Cli& cli, const RehearseOptions& options) {
+  if (options.sets == 0u)
+    return absl::InvalidArgumentError("--sets: 0 is out of range; 1 or more was expected");
   if (!(options.minutes > 0))
     return absl::InvalidArgumentError(
         absl::StrCat("--minutes: ", options.minutes, "; a positive number was expected"));

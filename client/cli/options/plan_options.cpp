@@ -53,7 +53,8 @@ void AddPlanOptions(Cli* cli, CLI::App* command, PlanOptions* options) {
                    "object; or a CSV file of explicit touches (touchstone plan writes one). "
                    "Default: sphere"));
   add("--speed-mm-s", options->speed_mm_s, "MM/S", "Speed of the approach. Default: 20; a file has its own");
-  add("--touch-interval-s", options->touch_interval_s, "S", "Time between the starts of touches. Default: 0");
+  add("--touch-interval-s", options->touch_interval_s, "S",
+      "Time between the starts of touches, over all objects. Default: 0");
   add("--step-angle-deg", options->step_angle_deg, "DEG",
       "sphere: directions are multiples of it. Default: 1");
   add("--roll-step-deg", options->roll_step_deg, "DEG",

@@ -113,8 +113,13 @@ absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const st
   writer->WritesDone();
   const absl::Status finished = client::FromGrpc(writer->Finish());
   TOUCHSTONE_RETURN_IF_ERROR(read);
-  TOUCHSTONE_RETURN_IF_ERROR(finished);
+  TOUCHSTONE_RETURN_IF_ERROR(WithFile(finished, name, path));
   return session;
+}
+
+absl::Status WithFile(const absl::Status& status, const std::string& session, const std::string& path) {
+  if (!absl::StartsWith(status.message(), session + ":")) return status;
+  return absl::Status(status.code(), absl::StrCat(path, status.message().substr(session.size())));
 }
 
 namespace {

@@ -16,6 +16,9 @@ bool IsHdf5Path(const std::string& path);  // it ends in .h5 or .hdf5
 // The folder of an image set, or the HDF5 file of one, with its touches if it has some.
 absl::StatusOr<service::StoredSession> ReadImageSession(const std::string& path);
 
+// A server knows what it is sent by the session's name alone: "monday:5: ..." becomes "set.csv:5: ...".
+absl::Status WithFile(const absl::Status& status, const std::string& session, const std::string& path);
+
 // Sends a measurement file or an image set, with its touches if it has some. `check`: it is not stored.
 absl::StatusOr<v1::Session> SendSession(client::Connection* connection, const std::string& path,
                                         const std::string& name, bool check);

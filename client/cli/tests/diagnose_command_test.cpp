@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <thread>
 
@@ -135,6 +136,11 @@ TEST_F(DiagnoseCommandTest, AServerGivesTheSameNumbersAndKeepsTheModel) {
   EXPECT_EQ(WithoutDuration(here.out), WithoutDuration(there.out));
   const Outcome kept = Run({"model", "show", "kept", "--server", address});
   EXPECT_THAT(kept.out, HasSubstr("tip_radius")) << kept.err;
+  const Outcome taken =
+      Run(Command("diagnose", {"--json", "again.json", "--server", address, "--keep-as", "kept"}));
+  EXPECT_EQ(taken.exit_code, 2);
+  EXPECT_THAT(taken.err, HasSubstr("--keep-as: the server has a model 'kept' already (hash "));
+  EXPECT_FALSE(std::filesystem::exists(Path("again.json"))) << "it is known before the diagnosis";
 
   // The same as a stored session, whose meshes are sent along.
   ASSERT_EQ(Run({"session", "create", "monday", "set.csv", "--server", address}).exit_code, 0);
@@ -158,6 +164,10 @@ TEST_F(DiagnoseCommandTest, SessionsAreStoredListedExportedAndDeleted) {
   const Outcome taken = Run({"session", "create", "monday", "other.csv", at});
   EXPECT_EQ(taken.exit_code, 2);
   EXPECT_THAT(taken.err, HasSubstr("session 'monday' stands for other bytes"));
+  // The server knows a name; the file is the one to open.
+  Write("bad.csv", "object,t_l_us,t_m_us,t_r_us\nlat00,1,0,nan\n");
+  EXPECT_THAT(Run({"session", "create", "friday", "bad.csv", at}).err,
+              HasSubstr("error: bad.csv:2: column t_r_us"));
   EXPECT_THAT(Run({"session", "create", "../x", "set.csv", at}).err, HasSubstr("name = '../x'"));
   EXPECT_EQ(Run({"session", "create", "checked", "other.csv", "--check", at}).exit_code, 0);
   const Json list = Json::parse(Run({"session", "list", "--json", at}).out);

@@ -163,6 +163,20 @@ TEST_F(PlanCommandTest, AnImplausibleSizeIsSaidOnceWithTheUnitThatWouldBeRight) 
               HasSubstr("implausibly large"));
 }
 
+TEST_F(PlanCommandTest, TheClockRunsOnOverTheObjects) {
+  const std::vector<std::vector<std::string>> plans = {
+      {"--count", "3"},
+      {"--count", "3", "--first", "4"},
+      {"--plan", "faces", "--samples-per-face", "1", "--rounds", "2"}};
+  for (const std::vector<std::string>& plan : plans) {
+    std::vector<std::string> arguments = {"plan", "lat00,lat10", "--touch-interval-s", "2.5", "--json"};
+    arguments.insert(arguments.end(), plan.begin(), plan.end());
+    const auto touches = nlohmann::json::parse(Run(arguments).out)["touches"];
+    ASSERT_GE(touches.size(), 6u);
+    for (const auto& touch : touches) EXPECT_EQ(touch["session_time_s"], 2.5 * touch["touch"].get<int>());
+  }
+}
+
 TEST_F(PlanCommandTest, AStartInsideTheObjectIsSaidByPlanAndTouch) {
   const Outcome touch =
       Run({"touch", "lat00", "--approach", "0,0,-1", "--standoff-mm", "20", "-o", "set.csv"});

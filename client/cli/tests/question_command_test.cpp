@@ -1,7 +1,10 @@
 // check, explain and compare with two models as people and scripts meet them: the real binary.
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <filesystem>
 
 #include <nlohmann/json.hpp>
 
@@ -52,6 +55,76 @@ TEST_F(QuestionCommandTest, ACheckIsTheSameWhateverTheTimesOfTheSet) {
   EXPECT_EQ(detectable("plan.csv"), detectable("set.csv"));
 }
 
+TEST_F(QuestionCommandTest, WhatCannotBeAskedIsRefusedWithTheOption) {
+  MakeSet();
+  Write("empty.yaml", "touchstone: model/1\nname: empty\n");
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"explain", "tipradius", "set.csv", "--model", "nominal.yaml"}, "did you mean 'tip_radius'?"},
+      {{"check", "plan.csv", "--model", "nominal.yaml", "--find", "tipradius", "--improve", "3", "-o",
+        "x.csv"},
+       "did you mean 'tip_radius'?"},
+      {{"rehearse", "plan.csv", "--model", "nominal.yaml", "--effects", "tipradius"},
+       "did you mean 'tip_radius'?"},
+      {{"check", "plan.csv", "--model", "nominal.yaml", "--noise", "1e30"},
+       "--noise: 1e+30 us is out of range; above 0 to 1000000 us was expected"},
+      {{"rehearse", "plan.csv", "--model", "nominal.yaml", "--sets", "0"}, "--sets: 0 is out of range"},
+      {{"propose", "set.csv", "--model", "nominal.yaml", "--photographs", "3"},
+       "--photographs: set.csv holds touches alone"},
+      {{"propose", "set.csv", "--model", "nominal.yaml", "--touches", "1e9"},
+       "--touches: 1000000000: at most 1000"},
+      {{"explain", "tip_radius", "set.csv", "--model", "nominal.yaml", "--also", "empty.yaml"},
+       "--also: empty.yaml has no effects"}};
+  for (const auto& [arguments, words] : cases) {
+    const Outcome outcome = Run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  }
+}
+
+TEST_F(QuestionCommandTest, TimesInMillisecondsAreRefusedWithTheCommandThatMendsThem) {
+  MakeSet();
+  auto rows = client::ParseMeasurements(Read("set.csv"), "set.csv");
+  ASSERT_TRUE(rows.ok()) << rows.status();
+  for (client::MeasuredTouch& row : *rows)
+    for (double& time : row.time_s) time /= 1000;
+  Write("ms.csv", client::FormatMeasurements(*rows));
+  for (const std::vector<std::string>& question :
+       {std::vector<std::string>{"compare"}, std::vector<std::string>{"explain", "tip_radius"}}) {
+    std::vector<std::string> arguments = question;
+    arguments.insert(arguments.end(), {"ms.csv", "--model", "nominal.yaml"});
+    EXPECT_THAT(Run(arguments).err,
+                HasSubstr("touchstone session fix ms.csv --scale-times 1000 -o fixed.csv"));
+  }
+}
+
+TEST_F(QuestionCommandTest, OneTouchIsSaidToBeTooLittleByWhateverIsAsked) {
+  MakeSet();
+  const std::string set = Read("set.csv");
+  Write("one.csv", set.substr(0, set.find('\n', set.find('\n') + 1) + 1));
+  const Outcome explained = Run({"explain", "tip_radius", "one.csv", "--model", "nominal.yaml"});
+  EXPECT_THAT(explained.out,
+              AllOf(HasSubstr("one.csv: 1 touch, model"), HasSubstr("That is too little for a verdict"),
+                    HasSubstr("16 usable touches would do")));
+  const Outcome proposed = Run({"propose", "one.csv", "--model", "nominal.yaml"});
+  EXPECT_THAT(proposed.err,
+              HasSubstr("no touches to propose from so few: more are needed first (16 usable ones)"));
+}
+
+TEST_F(QuestionCommandTest, AHistoryLeavesOutASessionWhoseObjectHasNoMesh) {
+  MakeSet();
+  ASSERT_EQ(
+      Run({"touch", "--plan", "plan.csv", "--model", "tips.yaml", "--seed", "9", "-o", "more.csv"}).exit_code,
+      0);
+  std::filesystem::create_directory(Path("days"));
+  Write("days/monday.csv", Read("set.csv"));
+  Write("days/tuesday.csv", absl::StrReplaceAll(Read("set.csv"), {{"lat20", "mug"}}));
+  Write("days/wednesday.csv", Read("more.csv"));
+  const Outcome outcome = Run({"history", "days", "--model", "nominal.yaml"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("note: left out: days/tuesday.csv"), HasSubstr("'mug' has no mesh")));
+}
+
 TEST_F(QuestionCommandTest, ProposedTouchesAreAPlanThatCanBeTouched) {
   MakePlan();
   const Outcome outcome = Run({"check", "plan.csv", "--model", "nominal.yaml", "--improve", "6", "--between",
@@ -76,7 +149,8 @@ TEST_F(QuestionCommandTest, ACheckSaysWhatIsWrongWithTheQuestion) {
   EXPECT_THAT(message({"--find", "tip_radius"}), HasSubstr("belong to --improve"));
   EXPECT_THAT(message({"--improve", "6", "--find", "tip_radios", "-o", "more.csv"}),
               HasSubstr("'tip_radios'"));
-  EXPECT_THAT(message({"--noise", "-5"}), HasSubstr("--noise: -5; a positive number of us was expected"));
+  EXPECT_THAT(message({"--noise", "-5"}),
+              HasSubstr("--noise: -5 us is out of range; above 0 to 1000000 us was expected"));
   Write("silent.yaml", "touchstone: model/1\nname: silent\nend_effector: {fingers: 3, spacing_mm: 30}\n");
   const Outcome silent = Run({"check", "plan.csv", "--model", "silent.yaml"});
   EXPECT_THAT(silent.err, AllOf(HasSubstr("'silent' has no noise"), HasSubstr("--noise 5")));

@@ -297,7 +297,7 @@ def test_a_message_without_a_pose_is_left_out_and_said(rows, tmp_path):
     (["none.mcap", "-o", "a.csv"], "none.mcap is not there; an MCAP file, a ROS 2 bag"),
     (["log.parquet"], "-o/--out is required (see touchstone import --help)"),
     (["log.parquet", "-o", "a.txt"], "'a.txt' does not say the format; a name that ends in .csv or .db was expected"),
-    (["log.parquet", "-o", "there.csv"], "there.csv exists; replace it with --force"),
+    (["log.parquet", "-o", "there.csv"], "there.csv exists; replace it with force=True (of a command: --force)"),
     (["log.parquet", "-o", "a.csv", "--map", "log.parquet"], "is not UTF-8 text"),
     (["log.parquet", "-o", "a.csv", "--map", "bad.yaml"], "bad.yaml is no YAML"),
     (["log.parquet", "-o", "a.csv", "--map", "other.yaml"], "other.yaml: its first entry is None; 'touchstone: mapping/1' was expected"),

@@ -105,3 +105,12 @@ def test_sessions_take_one_model(client, sessions):
         client.compare(sessions, NOMINAL, other_model=HIDDEN)
     with pytest.raises(touchstone.InvalidRequest, match="empty list"):
         client.diagnose([], NOMINAL)
+
+
+def test_what_takes_the_place_of_touches_or_a_model_is_named(client, measured, tmp_path, monkeypatch):
+    with pytest.raises(touchstone.InvalidRequest, match=r"touches is list; Touches were expected, as touches\(\)"):
+        client.touch("lat20", [])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "set.csv").write_bytes(measured.read_bytes())
+    with pytest.raises(touchstone.InvalidRequest, match="is a file, but no model file"):
+        client.diagnose("set.csv", "set.csv")

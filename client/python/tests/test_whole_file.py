@@ -6,6 +6,10 @@ import signal
 
 import pytest
 
+import touchstone
+from touchstone import mcap
+from touchstone.report import Report
+from touchstone.v1 import diagnosis_pb2
 from touchstone.whole_file import whole_file
 
 
@@ -57,3 +61,34 @@ def test_permission_bits_are_those_of_open_or_of_the_file_before(tmp_path):
     with whole_file(path) as file:
         file.write("again")
     assert path.stat().st_mode & 0o777 == 0o640
+
+
+_WRITERS = {
+    "save": lambda path, **how: Report(diagnosis_pb2.Report()).save(path, **how),
+    "save_model": lambda path, **how: Report(diagnosis_pb2.Report(improved_model_yaml="touchstone: model/1\n")).save_model(path, **how),
+    "write_measurements": lambda path, **how: touchstone.write_measurements(path, [], **how),
+}
+
+
+@pytest.mark.parametrize("write", _WRITERS.values(), ids=_WRITERS.keys())
+def test_a_file_that_is_there_is_replaced_only_where_that_is_asked_for(tmp_path, write):
+    path = tmp_path / "mine"
+    path.write_text("precious")
+    with pytest.raises(touchstone.InvalidRequest, match=r"mine exists; replace it with force=True"):
+        write(path)
+    assert path.read_text() == "precious"
+    write(path, force=True)
+    assert path.read_text() != "precious"
+
+
+@pytest.mark.parametrize("write", _WRITERS.values(), ids=_WRITERS.keys())
+def test_a_folder_that_is_missing_is_named(tmp_path, write):
+    with pytest.raises(touchstone.NotFound, match=r"the folder .*nowhere is not there; make it"):
+        write(tmp_path / "nowhere" / "file")
+
+
+def test_an_mcap_file_that_is_there_is_refused_by_the_function_as_by_the_command(tmp_path):
+    (tmp_path / "a.mcap").write_text("precious")
+    pytest.importorskip("mcap")
+    with pytest.raises(mcap.ExportError, match=r"a\.mcap exists; replace it with force=True"):
+        mcap.export(tmp_path / "a.h5", tmp_path / "a.mcap")

@@ -21,7 +21,7 @@ from .images import ImageLike, Views, image as default_image, to_image, to_views
 from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .own_server import OwnServer
-from .plans import PlanLike, Touches, plan_message
+from .plans import PlanLike, Touches, checked_touches, plan_message
 from .posterior import PosteriorLike
 from .printable import printable
 from .retry import RETRY_FOR_S, Retry
@@ -260,6 +260,7 @@ class Client(Diagnosis):
           source measured, one message per touch (touchstone.v1.Measured). A start inside of the object or an
           implausible size of it is a UserWarning.
         """
+        checked_touches("touches", touches)
         if ids is not None and len(ids) != len(touches):
             raise InvalidRequest(f"ids has {len(ids)} entries for {len(touches)} touches; give one each.")
         if session:
@@ -270,6 +271,7 @@ class Client(Diagnosis):
             series=series,
         )
         if previous is not None:
+            checked_touches("previous", previous[1])
             request.previous.extend(source_pb2.PreviousTouch(object=previous[0], touch=touch)
                                     for touch in previous[1][-2:].to_messages())
         with contextlib.nullcontext() if lease_token else self._leased() as lease:

@@ -26,9 +26,10 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from .errors import TouchstoneError
 from .printable import printable
 from .v1 import types_pb2
-from .whole_file import whole_file
+from .whole_file import check_target, whole_file
 
 SECOND_NS = 1_000_000_000
 
@@ -224,8 +225,15 @@ class SessionFile:
             yield float(times[k]), png, (pose[:3], pose[3:])
 
 
-def export(session: str | os.PathLike[str], output: str | os.PathLike[str]) -> dict[str, int]:
-    """Writes the MCAP file, whole or not at all; how many messages each channel got. ExportError says what is wrong."""
+def export(session: str | os.PathLike[str], output: str | os.PathLike[str], *, force: bool = False) -> dict[str, int]:
+    """Writes the MCAP file, whole or not at all; how many messages each channel got. ExportError says what is wrong.
+
+    force: replace a file that is there.
+    """
+    try:
+        check_target(output, force)
+    except TouchstoneError as error:
+        raise ExportError(str(error)) from None
     try:
         from mcap.writer import Writer
     except ImportError as error:
@@ -293,9 +301,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--force", action="store_true", help="replace a file that exists")
     options = parser.parse_args(arguments)
     try:
-        if os.path.exists(options.output) and not options.force:
-            raise ExportError(f"{options.output} exists; replace it with --force, or choose another name.")
-        counts = export(options.session, options.output)
+        counts = export(options.session, options.output, force=options.force)
     except (ExportError, ImportError, OSError, KeyError) as error:
         print(printable(f"error: {error}"), file=sys.stderr)
         return 1

@@ -14,7 +14,7 @@ import numpy as np
 from .batch import Batch
 from .errors import InvalidRequest
 from .plans import Touches, touches as make_touches
-from .whole_file import whole_file
+from .whole_file import check_target, whole_file
 
 VECTORS = {"target_mm": ("target_x_mm", "target_y_mm", "target_z_mm"),
             "approach": ("approach_x", "approach_y", "approach_z"),
@@ -90,11 +90,15 @@ def number_in(place: str, row: Mapping[str, str], name: str, empty: float | None
         raise InvalidRequest(f"{place}: {name} is '{text}', not a number.") from None
 
 
-def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row]) -> None:
+def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row], *, force: bool = False) -> None:
     """Writes a measurement file atomically: it is written beside the path and renamed.
 
+    Args:
+      force: replace a file that is there.
+
     Raises:
-      InvalidRequest: a row has another number of times than the first one.
+      InvalidRequest: a row has another number of times than the first one, or the file is there.
+      NotFound: the folder that it would stand in is not there.
       OSError: the file cannot be written; what was there stays.
     """
     rows = list(rows)
@@ -106,6 +110,7 @@ def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row]) -> Non
         if len(row.time_us) != fingers:
             raise InvalidRequest(f"Touch {row.touch} has {len(row.time_us)} times, but the first one has {fingers}.")
 
+    check_target(path, force)
     with whole_file(path, newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*_HEAD, *(f"t_{name}_us" for name in names), *(["session_time_s"] if has_time else []),

@@ -215,8 +215,8 @@ ModelLike = Union[None, str, os.PathLike[str], Model]
 def model_ref(model: ModelLike) -> types_pb2.ModelRef:
     """What a request says for a model.
 
-    None: the source's default. A Model: its hash. A path, or a text that ends in .yaml or .yml: the contents of
-    that file are sent. A text with more than one line: a whole model file. 8 to 64 hexadecimal digits: a hash.
+    None: the source's default. A Model: its hash. A path, or a text that ends in .yaml or .yml or has a /: the contents
+    of that file are sent. A text with more than one line: a whole model file. 8 to 64 hexadecimal digits: a hash.
     Any other text: a name in the source's store.
     """
     if model is None:
@@ -226,7 +226,9 @@ def model_ref(model: ModelLike) -> types_pb2.ModelRef:
     if isinstance(model, str):
         if "\n" in model:
             return types_pb2.ModelRef(yaml=model)
-        if not model.endswith((".yaml", ".yml")):
+        if not model.endswith((".yaml", ".yml")) and "/" not in model:
+            if pathlib.PurePath(model).suffix and pathlib.Path(model).is_file():
+                raise InvalidRequest(f"model: '{model}' is a file, but no model file: the name of one ends in .yaml.")
             is_hash = re.fullmatch("[0-9a-f]{8,64}", model)
             return types_pb2.ModelRef(hash=model) if is_hash else types_pb2.ModelRef(name=model)
     elif not isinstance(model, os.PathLike):

@@ -186,6 +186,13 @@ class Touches:
 PlanLike = Union[SpherePlan, FacesPlan, Touches]
 
 
+def checked_touches(name: str, given: Any) -> Touches:
+    """What it was given, which must be Touches; InvalidRequest names `name` and says what makes them."""
+    if not isinstance(given, Touches):
+        raise InvalidRequest(f"{name} is {type(given).__name__}; Touches were expected, as touches(), client.plan() or a Row's command give them.")
+    return given
+
+
 def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float | None = None,
            max_incidence_deg: float = 90.0) -> SpherePlan:
     """Random approaches from a sphere round the object towards its centre; drawn again until every finger hits.

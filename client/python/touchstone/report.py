@@ -18,7 +18,7 @@ from .printable import printable
 from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, UncertaintyBudget, Value, Versus
 from .tabular import Rows, Tabular
 from .v1 import diagnosis_pb2
-from .whole_file import whole_file
+from .whole_file import check_target, whole_file
 
 
 class Report(Tabular):
@@ -179,15 +179,15 @@ class Report(Tabular):
             old_name: dict[str, Any] = {"including_default_value_fields": True}
             return json_format.MessageToDict(shown, preserving_proto_field_name=True, **old_name)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as JSON."""
-        _write(path, json.dumps(self.to_dict(), indent=1) + "\n")
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
+        """Writes it as JSON; force: replace a file that is there, which is else an InvalidRequest."""
+        _write(path, json.dumps(self.to_dict(), indent=1) + "\n", force)
 
-    def save_model(self, path: str | os.PathLike[str]) -> None:
-        """Writes the improved model as a model file."""
+    def save_model(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
+        """Writes the improved model as a model file; force: replace a file that is there, which is else an InvalidRequest."""
         if not self.improved_model:
             raise InvalidRequest("The report has no improved model: nothing is to be added or changed.")
-        _write(path, self.improved_model)
+        _write(path, self.improved_model, force)
 
     def _ladder(self) -> list[tuple[DataReport, str, Quality]]:
         """(data, model, its error) of the given model, after each step, of the improved one."""
@@ -277,6 +277,7 @@ def _value(p: diagnosis_pb2.ParameterValue) -> Value:
     return Value(name, p.value, p.std_error, (p.lower, p.upper))
 
 
-def _write(path: str | os.PathLike[str], text: str) -> None:
+def _write(path: str | os.PathLike[str], text: str, force: bool) -> None:
+    check_target(path, force)
     with whole_file(path, encoding="utf-8") as file:
         file.write(text)

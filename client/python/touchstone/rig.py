@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Callable
 from . import checks
 from .lease import holder
 from .measurements import Row
-from .plans import Touches
+from .plans import Touches, checked_touches
 from .v1 import control_pb2, control_pb2_grpc, rig_pb2, rig_pb2_grpc
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class Rig:
 
     def check(self, object: str, touches: Touches) -> list[TouchCheck]:
         """Every check that these touches pass before anything moves, without motion."""
-        messages, result = touches.to_messages(), []
+        messages, result = checked_touches("touches", touches).to_messages(), []
         for first in range(0, len(messages), _CHECKS_A_REQUEST):
             request = rig_pb2.CheckTouchesRequest(object=object, touches=messages[first:first + _CHECKS_A_REQUEST])
             reply = self._client.call(_RIG, "CheckTouches", request)

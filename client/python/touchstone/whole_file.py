@@ -10,6 +10,22 @@ import tempfile
 from collections.abc import Iterator
 from typing import IO, Any
 
+from .errors import InvalidRequest, NotFound
+
+
+def check_target(path: str | os.PathLike[str], force: bool) -> None:
+    """That a new file or folder can get this name.
+
+    Raises:
+      InvalidRequest: it is taken, and may not be replaced.
+      NotFound: the folder that it would stand in is not there.
+    """
+    target = pathlib.Path(path)
+    if not target.absolute().parent.is_dir():
+        raise NotFound(f"{target}: the folder {target.absolute().parent} is not there; make it, or choose another.")
+    if target.exists() and not force:
+        raise InvalidRequest(f"{target} exists; replace it with force=True (of a command: --force), or choose another name.")
+
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], mode: str = "w", **options: Any) -> Iterator[IO[Any]]:

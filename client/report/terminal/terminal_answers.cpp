@@ -53,8 +53,10 @@ void AddVersus(const v1::Report& report, TextLayout* out) {
   out->Paragraph(versus.words(), TextLayout::kBold);
   out->Rows({{{absl::StrCat("'", report.model_name(), "'")}, {scale.Text(data.initial().rmse()), true}},
              {{absl::StrCat("'", versus.other_name(), "'")}, {scale.Text(versus.other().rmse()), true}}});
-  out->Paragraph(absl::StrCat("Of 1000 draws of poses, '", versus.other_name(), "' errs less in ",
-                              Share(versus.other_better()), "."));
+  // Of models that expect the same, none errs less in any.
+  if (versus.lower() != 0 || versus.upper() != 0)
+    out->Paragraph(absl::StrCat("Of 1000 draws of poses, '", versus.other_name(), "' errs less in ",
+                                Share(versus.other_better()), "."));
   AddSlices("Better in", versus.better(), scale, out);
   AddSlices("Worse in", versus.worse(), scale, out);
   AddDeciding("Deciding", versus.deciding(), scale, out);
@@ -66,8 +68,8 @@ std::string TerminalExplanation(const v1::Report& report, int width, bool colour
   if (report.data_size() > 0) {
     const v1::DataReport& data = report.data(0);
     out.Lead(absl::StrCat(data.session().empty() ? "" : absl::StrCat(data.session(), ": "),
-                          Count(data.count()), " touches, model '", report.model_name(), "'.",
-                          NoiseFloorSentence(data)));
+                          Count(data.count()), " ", ErrorScale(data).Counted(data.count()), ", model '",
+                          report.model_name(), "'.", NoiseFloorSentence(data)));
   }
   for (const std::string& warning : report.warnings())
     out.Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);

@@ -68,7 +68,7 @@ void AddErrors(const v1::Report& report, TextLayout* out) {
     const ErrorScale scale(data);
     const double before = data.initial().rmse(), after = data.final().rmse();
     rows.push_back({{SessionLabel(report, s)},
-                    {absl::StrCat(Count(data.count()), " touches"), true},
+                    {absl::StrCat(Count(data.count()), " ", scale.Counted(data.count())), true},
                     {before > 0 ? scale.Text(before) : "-", true},
                     {after > 0 && after < before ? absl::StrCat("-> ", scale.Text(after)) : "", true},
                     {data.noise_floor() > 0 ? absl::StrCat("floor ", scale.Text(data.noise_floor())) : "",

@@ -50,14 +50,15 @@ class Follower {
         continue;
       }
       const bool apart = name == words[i];
-      if (name == "--save-model")
-        saved_ = apart && i + 1 < words.size() ? words[i + 1] : words[i].substr(name.size() + 1);
+      std::string* const written = name == "--save-model" ? &saved_ : name == "--keep-as" ? &kept_ : nullptr;
+      if (written != nullptr)
+        *written = !apart ? words[i].substr(name.size() + 1) : i + 1 < words.size() ? words[i + 1] : "";
       i += apart;
     }
   }
 
   bool known() const { return known_; }
-  bool saved() const { return !saved_.empty(); }
+  bool saved() const { return !saved_.empty() || !kept_.empty(); }
 
   std::string Save(const std::string& further) const {
     return absl::StrCat("touchstone diagnose ", absl::StrJoin(rest_, " "), " --save-model ", kBetter,
@@ -73,7 +74,9 @@ class Follower {
       words.push_back(rest_[i]);
     }
     return absl::StrCat("touchstone compare ", absl::StrJoin(words, " "), " --model ",
-                        saved() ? saved_ : kBetter);
+                        !saved_.empty()  ? saved_
+                        : !kept_.empty() ? kept_
+                                         : kBetter);
   }
   std::string Propose(bool pictures) const {
     return absl::StrCat("touchstone propose ", absl::StrJoin(rest_, " "), " -o ",
@@ -83,7 +86,7 @@ class Follower {
  private:
   bool known_ = false;
   std::vector<std::string> rest_;  // words of the command that others take too
-  std::string saved_;
+  std::string saved_, kept_;       // the file, or the name at the server
 };
 
 }  // namespace

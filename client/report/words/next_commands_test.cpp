@@ -36,6 +36,13 @@ TEST(NextCommands, CompareWhatWasSaved) {
                           "touchstone propose set.csv --model=n.yaml -o plan.csv"));
 }
 
+TEST(NextCommands, CompareWhatAServerKeeps) {
+  EXPECT_THAT(CommandsOf(MissingEffectsReport(),
+                         "touchstone diagnose set.csv --model n.yaml --server s:1 --keep-as found"),
+              ElementsAre("touchstone compare set.csv --server s:1 --model found",
+                          "touchstone propose set.csv --model n.yaml --server s:1 -o plan.csv"));
+}
+
 TEST(NextCommands, ProposeWhereNothingChanged) {
   EXPECT_THAT(CommandsOf(AdequateReport(), "touchstone diagnose set.csv --model n.yaml"),
               ElementsAre("touchstone propose set.csv --model n.yaml -o plan.csv"));

@@ -147,7 +147,10 @@ std::string ValueWithError(const v1::ParameterValue& value) {
   std::string text;
   if (error > 0 && std::isfinite(error) && error < 1e7 && error > 1e-9) {
     const int decimals = DecimalsForError(error);
-    text = absl::StrCat(Fixed(value.value() * scale, decimals), " +- ", Fixed(error, decimals));
+    // Beyond seven digits nobody reads a value, however small its error.
+    const int shown = std::min(decimals, DecimalsFor(std::max(std::abs(value.value() * scale), error), 7));
+    text = absl::StrCat(Fixed(value.value() * scale, shown), " +- ",
+                        shown == decimals ? Fixed(error, decimals) : Number(error, 2));
   } else {
     text = error == 0 ? Tick(value.value() * scale) : Number(value.value() * scale);
   }

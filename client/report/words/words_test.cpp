@@ -42,6 +42,10 @@ TEST(TimeChange, SharesOneUnit) {
 TEST(ValueWithError, HasAsManyDigitsAsTheErrorAllows) {
   EXPECT_EQ(ValueWithError(Value(2.9812, 0.0211, "mm")), "2.98 +- 0.02 mm");
   EXPECT_EQ(ValueWithError(Value(2.9812, 0.0123, "mm")), "2.981 +- 0.012 mm");
+  EXPECT_EQ(ValueWithError(Value(0, 0.0123, "mm")), "0.000 +- 0.012 mm");
+  // Seven digits of a value, however small its error.
+  EXPECT_EQ(ValueWithError(Value(20, 0.000001, "mm")), "20.00000 +- 1e-6 mm");
+  EXPECT_EQ(ValueWithError(Value(20000, 0.001, "us")), "20.00000 +- 1e-6 ms");
   EXPECT_EQ(ValueWithError(Value(8200, 190, "us")), "8.20 +- 0.19 ms");
   EXPECT_EQ(ValueWithError(Value(-0.001, 0.5, "deg")), "0.0 +- 0.5 deg");
   EXPECT_EQ(ValueWithError(Value(20, 0, "mm/s")), "20 mm/s");

@@ -40,6 +40,9 @@ absl::StatusOr<PlannedTouches> ExpandPlan(Connection* connection, const std::vec
         row.touch = first + planned.touches.size();
         row.object = object;
         row.commanded = touch;
+        // One session: its clock goes on where the source, which knows of one object, begins anew. A list has its own times.
+        if (!request.plan().has_list() && request.plan().touch_interval_s() > 0)
+          row.commanded.set_session_time_s(row.touch * request.plan().touch_interval_s());
         planned.touches.push_back(std::move(row));
       }
       Add(response.draws(), &draws);

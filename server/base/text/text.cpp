@@ -68,6 +68,8 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
     // A long enough prefix, or the same name without its unit suffix, is as good as one edit.
     if (word.size() >= 3 && (candidate.rfind(std::string(word), 0) == 0))
       distance = std::min<size_t>(distance, 1);
+    // What shares no letter is not near, however short it is.
+    if (distance >= std::max(word.size(), candidate.size())) continue;
     if (distance < best_distance) best = &candidate, best_distance = distance;
   }
   if (best != nullptr) return absl::StrCat(", did you mean '", *best, "'?");

@@ -20,6 +20,7 @@ TEST(DidYouMean, NamesTheNearestWord) {
 }
 
 TEST(DidYouMean, ListsWhatIsKnownWhenNothingIsNear) {
+  EXPECT_EQ(DidYouMean("ft", {"mm", "m", "inch"}), "; known: mm, m, inch");
   EXPECT_EQ(DidYouMean("xyzzy", {"tool_yaw", "tip_radius"}), "; known: tool_yaw, tip_radius");
 }
 

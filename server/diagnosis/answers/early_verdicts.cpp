@@ -1,10 +1,13 @@
 #include "server/diagnosis/answers/early_verdicts.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 
@@ -51,6 +54,17 @@ report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisCo
     diagnosis.data_problems.push_back(report::InMicroseconds(problem));
   diagnosis.summary = report::Summarize(diagnosis);
   return diagnosis;
+}
+
+absl::Status WithFix(const absl::Status& refusal, const DiagnosisInput& input,
+                     const DiagnosisContext& context) {
+  if (!absl::IsInvalidArgument(refusal)) return refusal;
+  const auto problems = checks::FindDataProblems(input, context);
+  if (!problems.ok()) return refusal;
+  for (const engine::DataProblem& problem : *problems)
+    if (!problem.fix.empty())
+      return absl::InvalidArgumentError(absl::StrCat(refusal.message(), " Fix it with: ", problem.fix));
+  return refusal;
 }
 
 int TouchesNeeded(const touches::Observations& o) {

@@ -11,6 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text/readable_time.h"
 #include "server/base/units.h"
+#include "server/diagnosis/answers/early_verdicts.h"
 #include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
@@ -120,8 +121,9 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
         "an effect is explained on touches with poses; photographs and sets without poses were given");
   DiagnosisInput input = given;
   input.model = std::make_shared<const model::Model>(selection::TouchPartOf(*given.model));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::unique_ptr<selection::Workspace> workspace,
-                              selection::MakeWorkspace(input, context));
+  auto made = selection::MakeWorkspace(input, context);
+  if (!made.ok()) return WithFix(made.status(), input, context);
+  const std::unique_ptr<selection::Workspace> workspace = *std::move(made);
   const touches::Observations& o = *workspace->observations;
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
   diagnosis.model_name = given.model->name;
@@ -131,6 +133,11 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
   if (!diagnosis.data[0].initial)
     return absl::InvalidArgumentError(
         absl::StrCat(input.set->origin, ": no touch can be compared with the model"));
+  if (const int needed = TouchesNeeded(o); needed > 0) {
+    diagnosis.verdict = engine::Verdict::kTooLittleData;
+    diagnosis.data[0].needed = needed;
+    diagnosis.warnings.push_back(report::Summarize(diagnosis));
+  }
   report::ReportedExplanation& explained = diagnosis.explained.emplace();
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.found, Find(effect, workspace.get()));
   if (explained.found.fit) {
@@ -147,6 +154,8 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
     explained.speak_against = residuals::FindDecidingTouches(o, before, after, sigma_s, kDeciding, true);
   }
   explained.words = Words(explained, diagnosis.data[0].initial->rmse);
+  if (diagnosis.verdict == engine::Verdict::kTooLittleData)
+    explained.words = absl::StrCat("That is too little for a verdict. ", explained.words);
   diagnosis.summary = explained.words;
   return diagnosis;
 }

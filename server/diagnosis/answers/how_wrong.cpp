@@ -4,6 +4,7 @@
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/touches/data_summary.h"
 #include "server/session/images/emulated.h"
+#include "server/session/measurements/backward_times.h"
 #include "server/session/measurements/touch_content.h"
 
 namespace touchstone::diagnosis {
@@ -11,6 +12,7 @@ namespace touchstone::diagnosis {
 report::DataReport DataOf(const touches::Observations& observations, const DiagnosisInput& input) {
   report::DataReport data = report::DataOfTouches(touches::SummarizeData(observations));
   data.emulated = session::CountEmulated(*input.set);
+  data.backward_times = session::FindBackwardTimes(*input.set);
   data.content_sha256 = session::TouchContentSha256(*input.set);
   return data;
 }

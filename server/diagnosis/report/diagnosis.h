@@ -21,6 +21,7 @@
 #include "server/diagnosis/residuals/touches/describe_residuals.h"
 #include "server/diagnosis/touches/data_summary.h"
 #include "server/diagnosis/touches/same_poses.h"
+#include "server/session/measurements/backward_times.h"
 #include "server/uncertainty/budget.h"
 #include "server/uncertainty/posterior.h"
 
@@ -142,6 +143,7 @@ struct DataReport {
 
   // What the set consists of.
   int rows = 0, poses = 0, repeats = 0, rounds = 0, missed_contacts = 0;
+  session::BackwardTimes backward_times;  // of touches
   std::vector<std::string> objects;
   std::vector<double> speeds_mm_s;
 

@@ -179,6 +179,14 @@ TEST(DataWarnings, NameWhatLimitsTheSet) {
   EXPECT_THAT(warnings, Contains(StartsWith("9 of 10 rows could not be used")));
 }
 
+TEST(DataWarnings, NameAClockThatGoesBackwards) {
+  DataReport data = ExampleDiagnosis(Verdict::kNone).data[0];
+  data.backward_times = {2, 7, 0.5, 30};
+  EXPECT_THAT(
+      DataWarnings(data),
+      ElementsAre(StartsWith("session_time_s goes backwards at 2 rows, first from 30 to 0.5 s at touch 7:")));
+}
+
 Diagnosis AdequatePhotographs() {
   Diagnosis photographs;
   photographs.verdict = Verdict::kAdequate;

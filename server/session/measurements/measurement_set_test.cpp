@@ -12,6 +12,7 @@
 
 #include "server/base/test_paths.h"
 #include "server/base/text/text.h"
+#include "server/session/measurements/backward_times.h"
 
 namespace touchstone::session {
 namespace {
@@ -55,6 +56,18 @@ TEST(MeasurementSet, BeyondALimitNamesItAndItsValue) {
   EXPECT_THAT(std::string(status(absl::StrCat(kPoses, kTimes, ",round\n")).message()),
               HasSubstr("columns: 17: at most 16 (max_session_columns)"));
   EXPECT_THAT(std::string(status(Set(Row(0, "2e10,0,1"))).message()), HasSubstr("out of range"));
+}
+
+TEST(BackwardTimes, AreRowsBeforeTheRowAboveThem) {
+  MeasurementSet set;
+  set.object = {0, 0, 0, 0}, set.touch = {4, 5, 6, 7}, set.session_time_s = {0, 12.5, 3, 3};
+  EXPECT_EQ(FindBackwardTimes(set).rows, 0) << "it has no times";
+  set.has_session_time = true;
+  const BackwardTimes backward = FindBackwardTimes(set);
+  EXPECT_EQ(backward.rows, 1);
+  EXPECT_EQ(backward.touch, 6u);
+  EXPECT_EQ(backward.before_s, 12.5);
+  EXPECT_EQ(backward.time_s, 3);
 }
 
 TEST(MeasurementSet, IsReadInSiUnits) {

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from ..command import did_you_mean
 from ..errors import InvalidRequest, NotFound, Refused
 from ..mcap import ExportError, export as export_recording
-from ..whole_file import whole_folder
+from ..whole_file import check_target, whole_folder
 from . import card, hdf5, lerobot, mcap, parquet, sessions, webdataset
 from .datasets import DatasetFolder, open_dataset
 from .table import Table, Values, sha256_of
@@ -98,13 +98,11 @@ def export(source: str | os.PathLike[str], out: str | os.PathLike[str], to: str 
 
 def _check_target(source: pathlib.Path, target: pathlib.Path, force: bool) -> None:
     if not target.exists():
-        if not target.absolute().parent.is_dir():
-            raise NotFound(f"{target}: the folder {target.absolute().parent} is not there; make it, or choose another.")
+        check_target(target, force)
         return
     if target.resolve() == source.resolve() or target.resolve() in source.resolve().parents:
         raise InvalidRequest(f"{target} is what is exported, or holds it; choose another folder.")
-    if not force:
-        raise InvalidRequest(f"{target} exists; replace it with --force, or choose another name.")
+    check_target(target, force)
     exported = (target / "README.md").is_file() and "exported by touchstone" in (target / "README.md").read_text(encoding="utf-8", errors="replace")
     if not exported and not (target.is_dir() and not any(target.iterdir())):
         raise InvalidRequest(f"{target} exists and is no export of touchstone's: it is not replaced. Choose another name, or remove it.")

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InvalidRequest, NotFound
 from ..measurements import Row, write_measurements
 from ..plans import touches as make_touches
-from ..whole_file import whole_file
+from ..whole_file import check_target, whole_file
 from . import mapping as mappings, sessions
 from .mapping import UNIT_WITHIN, Mapping
 from .recordings import Recording, open_recording
@@ -65,8 +65,7 @@ def import_recording(source: str | os.PathLike[str], out: str | os.PathLike[str]
     path, target = pathlib.Path(source), pathlib.Path(out)
     if target.suffix not in (".csv", ".db"):
         raise InvalidRequest(f"out: '{target}' does not say the format; a name that ends in .csv or .db was expected.")
-    if target.exists() and not force:
-        raise InvalidRequest(f"{target} exists; replace it with --force, or choose another name.")
+    check_target(target, force)
     if isinstance(mapping, dict) or mapping is None:
         entries, origin = dict(mapping or {}), "mapping"
     else:
@@ -94,7 +93,7 @@ def _write(target: pathlib.Path, rows: list[Row], source: pathlib.Path) -> None:
             with whole_file(target, "wb") as file:
                 file.write(journal.read_bytes())
         else:
-            write_measurements(target, rows)
+            write_measurements(target, rows, force=True)
 
 
 def _rows(recording: Recording, mapping: Mapping) -> tuple[list[Row], list[str]]:

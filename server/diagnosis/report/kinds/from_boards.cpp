@@ -63,7 +63,7 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
   diagnosis.data = {DataOf(found, set)};
   for (const engine::LadderStep& from : found.steps) {
     Step step{from, {}};
-    step.words = absl::StrCat(ErrorWords(from.quality), step.words.empty() ? "" : "; ", step.words);
+    step.words = absl::StrCat(ErrorWords(from.quality), step.words.empty() ? "." : "; ", step.words);
     diagnosis.steps.push_back(std::move(step));
     diagnosis.data[0].after_step.push_back(from.quality);
   }

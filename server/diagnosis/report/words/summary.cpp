@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "server/base/text/readable_time.h"
+#include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/words/distributions_summary.h"
 #include "server/diagnosis/selection/session/time_structure.h"
@@ -180,6 +181,12 @@ void AddTouchWarnings(const DataReport& data, std::vector<std::string>* warnings
   if (unused * 5 > data.rows)
     warnings->push_back(
         absl::StrFormat("%d of %d rows could not be used; see the reasons.", unused, data.rows));
+  if (const session::BackwardTimes& backward = data.backward_times; backward.rows > 0)
+    warnings->push_back(absl::StrCat(
+        "session_time_s goes backwards at ", backward.rows, backward.rows == 1 ? " row" : " rows",
+        ", first from ", ShortestNumber(backward.before_s), " to ", ShortestNumber(backward.time_s),
+        " s at touch ", backward.touch,
+        ": what drifts with time is judged as if one clock ran on; give sessions as files of their own."));
 }
 
 }  // namespace

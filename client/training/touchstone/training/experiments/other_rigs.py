@@ -138,7 +138,7 @@ def _diagnosed(context, rig, measured):
                                  speed_mm_s=SPEED_MM_S)
     touchstone.write_measurements(path, [
         touchstone.Row(k, plans.OBJECTS[int(measured["object"][k])], touches[k:k + 1], tuple(measured["contact_time_us"][k]))
-        for k in range(len(touches))])
+        for k in range(len(touches))], force=True)
     try:
         report = context.simulator.diagnose(path, rig.model, seed=1)
     except touchstone.TouchstoneError as error:

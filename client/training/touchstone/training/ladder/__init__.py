@@ -212,7 +212,7 @@ def write_set(data: TouchData, path: pathlib.Path) -> None:
     touches = commanded(data)
     path.parent.mkdir(parents=True, exist_ok=True)
     touchstone.write_measurements(path, [
-        touchstone.Row(k, data.objects[data.object[k]], touches[k:k + 1], tuple(data.times_us[k])) for k in range(len(data))])
+        touchstone.Row(k, data.objects[data.object[k]], touches[k:k + 1], tuple(data.times_us[k])) for k in range(len(data))], force=True)
 
 
 def simulate_again(context: Context, data: TouchData, model: str, seed: int, *, standoff_mm: float = STANDOFF_MM) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from touchstone.tabular import Tabular
-from touchstone.whole_file import whole_file
+from touchstone.whole_file import check_target, whole_file
 
 from ..ladder import Rung, words as ladder_words
 from ..result import Estimate, Table
@@ -118,8 +118,9 @@ class Worth(Tabular):
         plain: dict[str, Any] = _plain(found)
         return plain
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as JSON, whole or not at all."""
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
+        """Writes it as JSON, whole or not at all; force: replace a file that is there, which is else an InvalidRequest."""
+        check_target(path, force)
         with whole_file(path, encoding="utf-8") as file:
             file.write(json.dumps(self.to_dict(), indent=1) + "\n")
 
