@@ -186,7 +186,10 @@ std::string WhyNotAssessed(const v1::Report& report) {
   }
   if (MainData(report).has_distributions()) return "touches without poses are compared as distributions";
   for (const v1::DataReport& data : report.data())
-    if (data.kind() == v1::DataReport::PHOTOGRAPHS) return "photographs have no such test";
+    if (data.kind() == v1::DataReport::PHOTOGRAPHS)
+      return report.data_size() > 1
+                 ? "touches and photographs were diagnosed one by one, or the pictures are too few"
+                 : "the pictures are too few";
   return "";
 }
 

@@ -57,6 +57,7 @@ class PhotoLadder {
     d_.noise_floor = NoiseFloorOfPhotographs(photographs_, best, pool_);
     d_.final = QualityOfPhotographs(photographs_, best, fit_.model.size(), pool_);
     d_.final->heldout_rmse *= selection_.heldout_ratio;
+    d_.nothing_missing = engine::WorstOfKinds({&selection_.tried});
     for (engine::LadderStep& step : d_.steps) AssessByPixels(photographs_, d_.noise_floor, &step.quality);
     for (engine::Quality* quality : {&*d_.initial, &*d_.final})
       AssessByPixels(photographs_, d_.noise_floor, quality);

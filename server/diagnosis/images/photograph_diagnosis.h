@@ -9,6 +9,7 @@
 
 #include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/engine/fit/parameter_estimate.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"
 #include "server/uncertainty/budget.h"
@@ -66,6 +67,7 @@ struct PhotographDiagnosis {
   engine::NoiseFloor noise_floor;
   std::optional<engine::Quality> initial, final;
   double reducible_share = 0;  // of the mean square error that is not noise, 0 to 1
+  std::optional<engine::NothingMissing> nothing_missing;  // none: too few pictures
 
   std::vector<engine::RefittedEffect> refitted;
   std::vector<engine::LadderStep> steps;

@@ -26,7 +26,7 @@ class PhotographModality : public engine::Modality {
     return found_.fine.search->candidates();
   }
   const engine::Fit& alone() const override { return found_.fit; }
-  const engine::TriedPValues& tried() const override { return tried_; }
+  const engine::TriedPValues& tried() const override { return found_.tried; }
   // Of every photograph, contours trusted as what the fit leaves shows.
   absl::StatusOr<engine::FinalRows> RowsNear(const engine::Fit& fit) const override;
   Eigen::MatrixXd CovarianceOf(const engine::Experiment& experiment, const engine::Fit& fit) const override;
@@ -40,7 +40,6 @@ class PhotographModality : public engine::Modality {
   DiagnosisContext context_;
   Photographs photographs_;
   PhotoSelection found_;
-  engine::TriedPValues tried_;  // none: their noise is not drawn
 };
 
 }  // namespace touchstone::diagnosis::images

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/images/pixels/image_field.h"
 #include "server/diagnosis/images/search/photo_quality.h"
@@ -252,6 +253,27 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   return made;
 }
 
+namespace {
+
+// Pictures are what is independent: the pixels of one share their errors.
+absl::StatusOr<engine::TriedPValues> TryOnPictures(const PhotoSearch& search, const model::Model& given,
+                                                   uint64_t seed) {
+  constexpr size_t kMinPictures = 8;
+  const PhotoRows& rows = *search.rows;
+  std::vector<int> pictures;
+  for (int row = 0; row < rows.rows(); ++row)
+    if (row == 0 || rows.PhotographOfRow(row) != rows.PhotographOfRow(row - 1)) pictures.push_back(row);
+  if (pictures.size() < kMinPictures) return engine::TriedPValues();
+  pictures.push_back(rows.rows());
+  TOUCHSTONE_ASSIGN_OR_RETURN(const engine::GivenAndEffects tried,
+                              engine::ColumnsOfEffects(*search.search, given));
+  engine::LinearHypotheses hypotheses(0, pictures);
+  hypotheses.AddEffects(rows, tried.effects);
+  return hypotheses.PValues(engine::DataAndTurned(tried.given.columns.values.col(0), pictures, seed));
+}
+
+}  // namespace
+
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,
                                                       const Photographs& photographs,
                                                       const DiagnosisContext& context) {
@@ -283,6 +305,7 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, engine::FitModel(*selection.fine.experiment, base));
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection.tried, TryOnPictures(selection.fine, *input.model, input.seed));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
   TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));

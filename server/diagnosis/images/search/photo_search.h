@@ -7,6 +7,7 @@
 
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/fit/fit.h"
+#include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/images/rows/photo_rows.h"
 #include "server/diagnosis/input.h"
 
@@ -57,7 +58,8 @@ struct PhotoSelection {
   Eigen::MatrixXd covariance;  // of the polished fit's free parameters, as its scatter between pictures shows
   // Of the fit, the error on photographs that it did not see over that on those it saw; at least 1.
   double heldout_ratio = 1;
-  double albedo_nats = 0;  // evidence of a smooth error of the albedo over none
+  double albedo_nats = 0;      // evidence of a smooth error of the albedo over none
+  engine::TriedPValues tried;  // of the given model; empty: too few pictures
 };
 
 absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& input,

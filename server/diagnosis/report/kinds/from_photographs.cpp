@@ -112,6 +112,7 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   data.initial = found.initial;
   data.final = found.final;
   data.reducible_share = found.reducible_share;
+  SetNothingMissing(found.nothing_missing, &diagnosis);
   AddWhere(found, set, &data);
   AddCauses(found, &diagnosis);
   diagnosis.uncertainty = found.uncertainty;
