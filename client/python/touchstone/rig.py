@@ -84,11 +84,12 @@ class Rig:
         return state
 
     def prepare(self, object: str, up_face: str, ask: Callable[[str, str], None] = _ask) -> None:
-        """mount(), if it does not lie so; where a person must put it down, ask(object, up_face) first."""
+        """mount(), if it does not lie so. Where a person must put it down the arm goes home, then ask(object, up_face)."""
         state = self.status()
         if (state.object, _FACE_NAMES.get(state.up_face, "")) == (object, up_face):
             return
         if not state.mounts_itself:
+            self.home()
             ask(object, up_face)
         self.mount(object, up_face)
 
