@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import InvalidRequest, Refused
+from ..plain_csv import read_csv
 from ..mcap import ExportError, SessionFile
 from ..whole_file import whole_file
 from . import sessions
@@ -246,7 +247,7 @@ def _measurements(path: pathlib.Path, target: pathlib.Path | None) -> Found:
     with tempfile.TemporaryDirectory(prefix="touchstone-verify-") as folder:
         def count(file: pathlib.Path) -> int:
             sessions.run_program("session", "import", file, "-o", pathlib.Path(folder) / f"{file.stem}.db")
-            return len(file.read_text(encoding="utf-8").splitlines()) - 1
+            return len(read_csv(file)[1])
 
         why = ""
         try:

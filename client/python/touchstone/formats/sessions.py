@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
 import functools
 import os
@@ -19,6 +18,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotFound, Refused
 from ..measurements import VECTORS, number_in
+from ..plain_csv import read_csv
 from ..own_server import find_server
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
@@ -62,18 +62,9 @@ def open_photographs(folder: pathlib.Path) -> MeasuredSet:
 
 
 def _read_csv(path: pathlib.Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            header = next(reader, [])
-            lines = [(reader.line_num, row) for row in reader if row]
-    except UnicodeDecodeError:
-        raise InvalidRequest(f"{path} is not UTF-8 text.") from None
+    header, lines = read_csv(path)
     if not lines:
         raise InvalidRequest(f"{path} has no rows; a header and a row per touch were expected.")
-    for line, row in lines:
-        if len(row) != len(header):
-            raise InvalidRequest(f"{path}:{line}: {len(row)} fields, but the header has {len(header)}.")
     return header, lines
 
 
