@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Callable
 
 from . import checks
+from .errors import Refused
 from .lease import holder
 from .measurements import Row
 from .plans import Touches, checked_touches
@@ -23,6 +25,7 @@ _FACES = {
 }
 _FACE_NAMES = {number: name for name, number in _FACES.items()}
 _CHECKS_A_REQUEST = 100
+_NAMED = 20  # impossible touches
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,13 +105,30 @@ class Rig:
             result += [TouchCheck(c.possible, c.reason, _FACE_NAMES.get(c.up_face, ""), c.duration_s) for c in reply.checks]
         return result
 
-    def groups(self, rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
-        """The rows that are possible, by (object, up_face), in the order of the plan; what lies there comes first."""
+    def groups(self, rows: Sequence[Row], skip_impossible: bool = False) -> dict[tuple[str, str], list[Row]]:
+        """The rows by (object, up_face), in the order of the plan; what lies there comes first. Nothing moves.
+
+        Args:
+          skip_impossible: leave out touches that the rig cannot make, with a UserWarning.
+
+        Raises:
+          Refused: touches are impossible here, without skip_impossible; or all of them are.
+        """
         groups: dict[tuple[str, str], list[Row]] = {}
+        impossible: list[str] = []
         for row in rows:
             [check] = self.check(row.object, row.command)
             if check.possible:
                 groups.setdefault((row.object, check.up_face), []).append(row)
+            else:
+                impossible.append(f"touch {row.touch} of {row.object}: {check.reason}")
+        if impossible:
+            names = "; ".join(impossible[:_NAMED]) + (f"; and {len(impossible) - _NAMED} more" if len(impossible) > _NAMED else "")
+            said = f"{len(impossible)} of {len(rows)} touches are impossible here: {names}"
+            if not skip_impossible or not groups:
+                raise Refused(f"{said}. Nothing was moved; change the plan"
+                              + ("." if not groups else ", or leave them out with skip_impossible=True."))
+            warnings.warn(f"{said}. They are left out.", stacklevel=2)
         state = self.status()
         objects = list(dict.fromkeys(row.object for row in rows))
         mounted = (state.object, _FACE_NAMES.get(state.up_face, ""))
