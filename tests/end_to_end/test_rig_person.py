@@ -118,3 +118,21 @@ def test_what_was_made_before_comes_back_without_motion_and_is_called_so(rig, tm
     held = subprocess.run([BIN / "touchstone", *words, "-o", tmp_path / "monday.db", "--session", "plan"], capture_output=True,
                           text=True, timeout=PATIENCE_S, check=True)
     assert "has 2 of 2 touches already; nothing was moved" in " ".join(held.stderr.split())
+
+
+def test_a_stop_of_a_source_without_a_rig_names_no_command_that_is_refused_there():
+    server = subprocess.Popen([BIN / "touchstone-server", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        address = wait_for_line(server)
+        stopped = subprocess.run([BIN / "touchstone", "rig", "stop", "--server", address], capture_output=True, text=True, timeout=PATIENCE_S,
+                                 check=True)
+        assert "virtual source, which has no rig" in stopped.stderr and "rig reset" not in stopped.stderr
+        assert "virtual source, which has no rig" in touchstone("rig", "reset", "--reason", "a test", server=address, code=4)
+    finally:
+        server.terminate()
+        server.wait(timeout=PATIENCE_S)
+
+
+def test_what_a_rig_does_not_offer_is_said_with_who_does(rig):
+    refused = touchstone("effects", server=rig, code=4)
+    assert "models, effects and diagnoses are a touchstone-server's" in " ".join(refused.split())

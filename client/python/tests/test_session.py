@@ -261,6 +261,11 @@ def test_a_person_releases_the_stop(rig, rig_client):
     assert [reason for _, reason in rig.resets] == ["cable freed"] and rig.resets[0][0]
 
 
+def test_a_source_without_a_rig_has_no_stop_to_release(client):
+    with pytest.raises(touchstone.Refused, match="is a virtual source, which has no rig"):
+        client.rig.reset("cable freed")
+
+
 def test_power_on_carries_a_lease(rig, rig_client):
     rig_client.rig.power_on()
     assert rig.powered_with == "token1"

@@ -60,7 +60,14 @@ class Rig:
         return self._client.stop(reason)
 
     def reset(self, reason: str) -> control_pb2.State:
-        """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease."""
+        """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease.
+
+        Raises:
+          Refused: the source is no rig; a stop there ends what runs and holds nothing.
+        """
+        if not self._client.is_physical:
+            raise Refused(f"{self._client.target} is a {self._client.describe().kind} source, which has no rig: a stop ends what runs there "
+                          "and holds nothing, so there is none to release.")
         request = control_pb2.ResetRequest(holder=holder(), reason=reason)
         state: control_pb2.State = self._client.call(_CONTROL, "Reset", request, repeat=False)
         return state

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import json
 import os
 import pathlib
 import re
@@ -18,8 +19,8 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotFound, Refused
 from ..measurements import VECTORS, number_in
-from ..plain_csv import read_csv
 from ..own_server import find_server
+from ..plain_csv import read_csv
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
 _POSES = {f"{when}{name}": tuple(f"{when}{name.removesuffix('_mm')}_{axis}{'_mm' if name.endswith('_mm') else ''}" for axis in "xyz")
@@ -123,12 +124,19 @@ def program() -> str:
     raise NotFound("The program touchstone is not in PATH, and reads the journals of sessions. Put it there, or name it in TOUCHSTONE_PROGRAM.")
 
 
-def run_program(*words: str | os.PathLike[str]) -> None:
-    """Runs a command; its own error, if it fails."""
+def ask_program(*words: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a command with --json says; its own error, if it fails."""
+    said: dict[str, Any] = json.loads(run_program(*words, "--json"))
+    return said
+
+
+def run_program(*words: str | os.PathLike[str]) -> str:
+    """Runs a command and gives what it prints; its own error, if it fails."""
     done = subprocess.run([program(), *words, "--quiet"], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         message = done.stderr.strip().removeprefix("touchstone: error: ") or f"exit status {done.returncode}"
         raise (InvalidRequest if done.returncode == 2 else Refused)(f"touchstone {words[0]} {words[1]}: {message}")
+    return done.stdout
 
 
 @contextlib.contextmanager
