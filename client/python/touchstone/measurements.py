@@ -99,7 +99,8 @@ def rows_of(header: Sequence[str], lines: Sequence[tuple[int, list[str]]], origi
         command = make_touches(standoff_mm=_within(place, row, "standoff_mm", *_RANGES["standoff_mm"]), speed_mm_s=speed, **columns)
         for name in times:
             if row[name] and not 0 <= number(name) <= _MAX_TIME_US:
-                raise InvalidRequest(f"{place}: {name} is '{row[name]}'; a time from 0 to {_MAX_TIME_US:g} us was expected, or nothing where the finger reported "
+                raise InvalidRequest(f"{place}: {name} is '{row[name]}'; a time from 0 to {_MAX_TIME_US:g} us was expected, or nothing where the "
+                                     "finger reported "
                                      "nothing.")
         rows.append(Row(touch, row["object"], command, tuple(number(name, float("nan")) for name in times), session_time_s,
                         round=_whole(place, row, "round") if "round" in row else None,

@@ -19,7 +19,8 @@ from ..measurements import VECTORS
 from ..units import lab_array, si_value
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
-_SI_NAMES = {"contact_time_us": "contact_time_s", "descriptor_us": "descriptor_s", "target_mm": "target_m", "standoff_mm": "standoff_m", "speed_mm_s": "speed_m_s"}
+_SI_NAMES = {"contact_time_us": "contact_time_s", "descriptor_us": "descriptor_s", "target_mm": "target_m",
+             "standoff_mm": "standoff_m", "speed_mm_s": "speed_m_s"}
 _IN_TEXT = ("target_mm", "approach", "lateral", "standoff_mm", "speed_mm_s")
 _VERIFY = "`touchstone dataset verify` says what is wrong"
 
