@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 
 #include "client/cli/common/progress_bar.h"
@@ -181,6 +182,21 @@ std::string Rounded(double value) {
 
 std::string Counted(uint64_t count, const std::string& one, const std::string& many) {
   return absl::StrCat(count, " ", count == 1 ? one : many);
+}
+
+std::string UtcText(double unix_s) {
+  const auto seconds = static_cast<std::time_t>(unix_s);
+  std::tm parts{};
+  char text[32] = "";
+  if (::gmtime_r(&seconds, &parts) != nullptr)
+    std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+std::string FromJournalText(size_t count, size_t all, double first_unix_s) {
+  return absl::StrCat(count, " of ", Counted(all, "touch", "touches"), count == 1 ? " comes" : " come",
+                      " from the gateway's journal",
+                      first_unix_s > 0 ? ", made at " + UtcText(first_unix_s) : "");
 }
 
 void PrintJson(const Json& json) {

@@ -197,6 +197,11 @@ std::string Rounded(double value);
 
 // "1 shard", "7 shards".
 std::string Counted(uint64_t count, const std::string& one, const std::string& many);
+// "2026-11-28 04:30:54 UTC"
+std::string UtcText(double unix_s);
+// "8 of 12 touches come from the gateway's journal, made at 2026-11-28 04:30:54 UTC"; `first_unix_s`: when the first of them
+// began, 0: unknown.
+std::string FromJournalText(size_t count, size_t all, double first_unix_s);
 
 void PrintJson(const Json& json);
 

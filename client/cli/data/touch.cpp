@@ -9,6 +9,7 @@
 #include "client/cli/options/touch_options.h"
 #include "client/source/dataset/lab_units.h"
 #include "client/source/dataset/measurement_csv.h"
+#include "client/source/plans/journalled_touches.h"
 #include "client/source/plans/session_parts.h"
 #include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
@@ -78,6 +79,16 @@ absl::Status AimRows(const TouchOptions& options, client::Connection* connection
   return absl::OkStatus();
 }
 
+// When the first of those that `stands` names began.
+double FirstUnixS(const std::vector<TouchRow>& rows, const std::vector<bool>& stands) {
+  double first_s = 0;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const double unix_s = rows[k].result.measured().start_unix_s();
+    if (stands[k] && (first_s == 0 || unix_s < first_s)) first_s = unix_s;
+  }
+  return first_s;
+}
+
 // All rows are one session; the noise depends on the row's number alone. A physical source gets one at a time, with
 // ids: those of a plan's touches are always the same, so that a repeated command resumes where it stopped.
 absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<TouchRow>* rows,
@@ -96,6 +107,11 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
   const size_t max_touches = source->touches_per_request();
   std::vector<client::MeasuredTouch> commanded;
   for (const TouchRow& row : *rows) commanded.push_back(row.measured);
+  // A plan's touches that the source has made before come from its journal: they are no new ones.
+  std::vector<bool> stands(rows->size());
+  if (source->physical() && !options.plan.empty()) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(stands, client::TouchesInJournal(connection.get(), session, commanded));
+  }
   std::set<std::string> said;
   for (size_t first = 0; first < rows->size();) {
     v1::TouchRequest request = client::PartOfSession(commanded, first, max_touches);
@@ -132,6 +148,11 @@ absl::Status TouchAll(const Cli& cli, const TouchOptions& options, std::vector<T
     }
     first = stop;
   }
+  bar.Clear();
+  if (const size_t count = std::count(stands.begin(), stands.end(), true); count > 0)
+    cli.Log(absl::StrCat(FromJournalText(count, rows->size(), FirstUnixS(*rows, stands)),
+                         count == rows->size() ? "; nothing was moved" : "",
+                         "; --session NAME makes new ones"));
   return absl::OkStatus();
 }
 

@@ -44,11 +44,18 @@ absl::Status RunStop(const Cli& cli, const MotionCommandOptions& options) {
                            "stop if anything moves"
                          : response.not_confirmed(),
                      ". It holds until somebody releases it: touchstone rig reset --reason TEXT"));
-  cli.Log(absl::StrCat("stopped, and nothing moves; ",
-                       Counted(response.aborted_touches(), "touch was", "touches were"),
-                       " under way. This is a software stop and not safety-rated. It holds until somebody "
-                       "releases it: touchstone "
-                       "rig reset --reason TEXT"));
+  const std::string aborted = Counted(response.aborted_touches(), "touch was", "touches were");
+  // Asked afterwards: a stop waits for nothing.
+  const auto source = connection->Call(&v1::Source::Stub::Describe, v1::DescribeRequest());
+  if (source.ok() && source->kind() != v1::SOURCE_KIND_PHYSICAL)
+    cli.Log(absl::StrCat("stopped; ", aborted, " under way. ", connection->address(), " is a ",
+                         client::SourceKindName(source->kind()),
+                         " source, which has no rig: nothing moves there, and nothing holds a stop"));
+  else
+    cli.Log(absl::StrCat("stopped, and nothing moves; ", aborted,
+                         " under way. This is a software stop and not safety-rated. It holds until somebody "
+                         "releases it: touchstone "
+                         "rig reset --reason TEXT"));
   return absl::OkStatus();
 }
 

@@ -43,12 +43,11 @@ absl::StatusOr<Json> RigJson(const v1::State& state, const v1::RigState& rig) {
 
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
                              const std::string& object, const std::string& up_face) {
-  if (state.object() == object && client::UpFaceWord(state.up_face()) == up_face) return absl::OkStatus();
-  if (!state.mounts_itself())
-    TOUCHSTONE_RETURN_IF_ERROR(AskPerson(client::RestingFaceRequest(object, up_face, state.object())));
-  else
+  if (state.mounts_itself() && (state.object() != object || client::UpFaceWord(state.up_face()) != up_face))
     cli.Log(absl::StrCat("the rig puts ", object, " on the fixture with its face ", up_face, " up"));
-  return source->Mount(object, client::UpFaceOf(up_face)).status();
+  return source->EnsureMounted(state, object, client::UpFaceOf(up_face), [&] {
+    return AskPerson(client::RestingFaceRequest(object, up_face, state.object()));
+  });
 }
 
 std::string ImpossibleTable(const std::vector<PlannedRow>& rows, size_t max_lines) {

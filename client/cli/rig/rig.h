@@ -27,8 +27,8 @@ absl::StatusOr<v1::RigState> GetRig(client::Connection* connection);
 // {"state": State, "rig": RigState}: as JSON with the protocol's names and units.
 absl::StatusOr<Json> RigJson(const v1::State& state, const v1::RigState& rig);
 
-// Says that the object lies on the fixture as it must. Where the rig changes it by itself it does; else a
-// person is asked, unless it lies there already.
+// Says that the object lies on the fixture as it must. Where the rig changes it by itself it does; else the arm
+// goes home and a person is asked, unless it lies there already.
 absl::Status MountForTouches(const Cli& cli, client::LeasedSource* source, const v1::RigState& state,
                              const std::string& object, const std::string& up_face);
 

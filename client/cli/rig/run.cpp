@@ -7,6 +7,7 @@
 #include "client/cli/options/plan_options.h"
 #include "client/cli/rig/record.h"
 #include "client/cli/rig/rig.h"
+#include "client/source/plans/journalled_touches.h"
 #include "client/source/plans/touch_ids.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
@@ -17,6 +18,7 @@ namespace touchstone::cli {
 namespace {
 
 constexpr size_t kMaxRefusalsShown = 20;
+constexpr char kHowToMakeNewOnes[] = "; --session NAME makes new ones";
 
 struct RunOptions {
   MotionFlags motion;
@@ -48,10 +50,17 @@ class Run {
     }
     if (wanted.size() < rows_.size())
       cli_.Log(absl::StrCat(journal_path_, " has ", rows_.size() - wanted.size(), " of ",
-                            Counted(rows_.size(), "touch", "touches"), " already; the rest is made now"));
+                            Counted(rows_.size(), "touch", "touches"), " already",
+                            wanted.empty() ? absl::StrCat("; nothing was moved", kHowToMakeNewOnes)
+                                           : "; the rest is asked for now"));
+    TOUCHSTONE_RETURN_IF_ERROR(LookInJournal(wanted));
     TOUCHSTONE_RETURN_IF_ERROR(Check(wanted));
     const absl::Status status = wanted.empty() ? absl::OkStatus() : TouchAll(wanted, state);
     bar_.Clear();
+    if (from_journal_ > 0)
+      cli_.Log(absl::StrCat(FromJournalText(from_journal_, rows_.size(), first_unix_s_),
+                            made_ == 0 ? absl::StrCat("; nothing was moved", kHowToMakeNewOnes)
+                                       : absl::StrCat("; ", Counted(made_, "was", "were"), " made now")));
     if (!status.ok()) {
       cli_.Log(absl::StrCat(Counted(made_, "touch was", "touches were"),
                             " made now; run the same command again to resume"));
@@ -61,11 +70,24 @@ class Run {
   }
 
  private:
+  // Which of them the source has made before, for another output.
+  absl::Status LookInJournal(const std::vector<size_t>& wanted) {
+    stands_.resize(rows_.size());
+    if (wanted.empty()) return absl::OkStatus();
+    std::vector<client::MeasuredTouch> plan;
+    for (const PlannedRow& row : rows_) plan.push_back(row.touch);
+    TOUCHSTONE_ASSIGN_OR_RETURN(stands_, client::TouchesInJournal(rig_.connection.get(), session_, plan));
+    return absl::OkStatus();
+  }
+
   // A dry run of what is to be made.
   absl::Status Check(const std::vector<size_t>& wanted) {
     TOUCHSTONE_RETURN_IF_ERROR(
         CheckRows(rig_.connection.get(), wanted, &rows_, nullptr, [] { return !Interrupt::Raised(); }));
-    for (const PlannedRow& row : rows_) impossible_ += !row.possible;
+    for (size_t row = 0; row < rows_.size(); ++row) {
+      if (stands_[row]) rows_[row].possible = true;  // it was made
+      impossible_ += !rows_[row].possible;
+    }
     if (impossible_ == 0) return absl::OkStatus();
     cli_.Log(ImpossibleTable(rows_, kMaxRefusalsShown));
     if (options_.skip_impossible) {
@@ -85,8 +107,15 @@ class Run {
     };
     TOUCHSTONE_ASSIGN_OR_RETURN(source_, OpenLeased(cli_, rig_.connection.get(), options_.motion, log));
     const StopOnInterrupt stop_on_interrupt(source_.get());
+    // What stands in the source's journal comes without motion: neither the arm nor the object has to move for it.
     std::vector<bool> take(rows_.size());
-    for (const size_t row : wanted) take[row] = rows_[row].possible;
+    left_ = wanted.size();
+    for (const size_t row : wanted) {
+      if (stands_[row])
+        TOUCHSTONE_RETURN_IF_ERROR(TouchOne({rows_[row].touch.object, rows_[row].up_face, {}, 0}, row));
+      take[row] = rows_[row].possible && !stands_[row];
+    }
+    left_ = 0;
     const std::vector<RigGroup> groups = client::GroupRows(
         rows_, [&](size_t row) { return take[row]; }, state.object(), client::UpFaceWord(state.up_face()));
     for (const RigGroup& group : groups) {
@@ -99,7 +128,7 @@ class Run {
       cli_.Log(absl::StrCat(group.object, ", face ", group.up_face,
                             " up: ", Counted(group.rows.size(), "touch", "touches"), ", about ",
                             DurationInWords(group.duration_s)));
-      for (const size_t row : group.rows) TOUCHSTONE_RETURN_IF_ERROR(TouchOne(group, rows_[row]));
+      for (const size_t row : group.rows) TOUCHSTONE_RETURN_IF_ERROR(TouchOne(group, row));
     }
     return absl::OkStatus();
   }
@@ -109,7 +138,8 @@ class Run {
     return MountForTouches(cli_, source_.get(), state, group.object, group.up_face);
   }
 
-  absl::Status TouchOne(const RigGroup& group, const PlannedRow& row) {
+  absl::Status TouchOne(const RigGroup& group, size_t number) {
+    const PlannedRow& row = rows_[number];
     bar_.ShowStage(absl::StrCat("touch ", row.touch.touch, " of ", row.touch.object, ", ", left_, " left, ",
                                 DurationInWords(left_s_ * pace_)),
                    1 - static_cast<double>(left_) / rows_.size());
@@ -146,6 +176,12 @@ class Run {
     }
     TOUCHSTONE_RETURN_IF_ERROR(record_->Done(row.id, response->results(0)));
     without_series_ += options_.series && !response->results(0).measured().has_series();
+    if (stands_[number]) {
+      const double unix_s = response->results(0).measured().start_unix_s();
+      if (from_journal_++ == 0 || unix_s < first_unix_s_) first_unix_s_ = unix_s;
+      --left_;
+      return absl::OkStatus();
+    }
     took_s_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     expected_s_ += row.duration_s;
     if (expected_s_ > 0) pace_ = took_s_ / expected_s_;
@@ -173,6 +209,7 @@ class Run {
                  {"journal", journal_path_},
                  {"touches", touches.size()},
                  {"made_now", made_},
+                 {"from_journal", from_journal_},
                  {"impossible", impossible_},
                  {"misses", misses},
                  {"noise_us", std::isfinite(noise_s) ? Json(noise_s * kMicrosecondsPerSecond) : Json()}});
@@ -201,8 +238,9 @@ class Run {
   RigConnection rig_;
   std::unique_ptr<client::LeasedSource> source_;
   std::unique_ptr<RigRecord> record_;
-  size_t impossible_ = 0, made_ = 0, left_ = 0, without_series_ = 0;
-  double left_s_ = 0, took_s_ = 0, expected_s_ = 0, pace_ = 1;
+  std::vector<bool> stands_;  // of each row: the source made it before
+  size_t impossible_ = 0, made_ = 0, from_journal_ = 0, left_ = 0, without_series_ = 0;
+  double first_unix_s_ = 0, left_s_ = 0, took_s_ = 0, expected_s_ = 0, pace_ = 1;
 };
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <absl/strings/str_join.h>
 
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 
 #include "client/cli/common/common.h"
@@ -77,15 +76,6 @@ Json JournalSessionJson(const session::JournalSession& session) {
           {"deleted_unix_s", session.deleted_unix_s},
           {"deleted_by", session.deleted_by},
           {"objects", session.objects}};
-}
-
-std::string UtcText(double unix_s) {
-  const auto seconds = static_cast<std::time_t>(unix_s);
-  std::tm parts{};
-  char text[32] = "";
-  if (::gmtime_r(&seconds, &parts) != nullptr)
-    std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
-  return text;
 }
 
 std::string DeletedText(double unix_s, const std::string& by) {

@@ -21,7 +21,7 @@ struct VerifyOptions {
 // What reading the whole session found.
 struct Found {
   std::string name;
-  uint64_t touches = 0, images = 0;
+  uint64_t touches = 0, done = 0, images = 0;
   bool checksums = true;
   std::vector<std::string> damaged;  // in words
 };
@@ -46,6 +46,7 @@ absl::StatusOr<Found> ReadJournal(const Cli& cli, const VerifyOptions& options) 
   TOUCHSTONE_RETURN_IF_ERROR(journal->ForEachTouch(session.name, [&](const session::JournalTouch& touch) {
     ids.push_back(touch.id);
     ++found.touches;
+    found.done += touch.stage == session::TouchStage::kDone;
     show();
     return !Interrupt::Raised();
   }));
@@ -81,7 +82,7 @@ absl::StatusOr<Found> ReadStored(const Cli& cli, const VerifyOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const v1::Session read,
       service::DescribeSession(options.name, service::PackSession(stored), options.name));
-  Found found{options.name, read.touches(), read.images(), true, {}};
+  Found found{options.name, read.touches(), read.touches(), read.images(), true, {}};
   if (read.hash() != noted.hash())
     found.damaged.push_back(absl::StrCat("what was sent has the hash ", read.hash().substr(0, 12),
                                          "; the server noted ", noted.hash().substr(0, 12)));
@@ -108,10 +109,13 @@ absl::Status RunVerify(const Cli& cli, const VerifyOptions& options) {
                {"whole", found.damaged.empty()},
                {"checksums", found.checksums},
                {"touches", found.touches},
+               {"done", found.done},
                {"images", found.images},
                {"damaged", found.damaged}});
-  const std::string read = absl::StrCat(Counted(found.touches, "touch", "touches"), ", ",
-                                        Counted(found.images, "picture", "pictures"));
+  const std::string read =
+      absl::StrCat(Counted(found.touches, "touch", "touches"),
+                   found.done < found.touches ? absl::StrCat(" (", found.done, " of them done)") : "", ", ",
+                   Counted(found.images, "picture", "pictures"));
   if (!found.damaged.empty())
     return absl::DataLossError(absl::StrCat(
         "session '", found.name, "' is not whole: ", read, " can be read; ", Shown(found.damaged),

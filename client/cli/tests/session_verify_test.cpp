@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/tests/real_binary_test.h"
+#include "server/session/journal/command_bytes.h"
+#include "server/session/journal/journal.h"
 
 namespace touchstone::cli {
 namespace {
@@ -47,6 +49,24 @@ TEST_F(SessionVerifyTest, AChangedTouchIsNamedAndTheOthersCounted) {
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("is not whole: 3 touches"), HasSubstr("differs from its checksum"),
                                  HasSubstr("touchstone recover session.db")));
+}
+
+TEST_F(SessionVerifyTest, ATouchThatAKillLeftUnderWayIsCountedAsInTheList) {
+  {
+    const auto journal =
+        session::Journal::Open(Path("session.db"), session::Journal::Mode::kCreateOrReadWrite);
+    ASSERT_TRUE(journal.ok()) << journal.status();
+    ASSERT_TRUE((*journal)->Begin("set", "killed", "lat20", "+z", session::CommandBytes(v1::CommandedTouch())).ok());
+  }
+  const auto listed =
+      nlohmann::json::parse(Run({"session", "list", "session.db", "--json"}).out)["sessions"][0];
+  const Outcome verified = Run({"session", "verify", "session.db", "--json"});
+  const auto read = nlohmann::json::parse(verified.out);
+  for (const auto& counts : {listed, read}) {
+    EXPECT_EQ(counts["touches"], 5);
+    EXPECT_EQ(counts["done"], 4);
+  }
+  EXPECT_THAT(verified.err, HasSubstr("is whole: 5 touches (4 of them done)"));
 }
 
 TEST_F(SessionVerifyTest, WithoutAServerANameSaysWhatIsMissing) {

@@ -10,9 +10,10 @@ import touchstone
 
 target, plan, name, output = sys.argv[1:]
 client = touchstone.connect(target)
-done = []
 with client.session(name) as session:
-    for (thing, face), rows in client.rig.groups(touchstone.read_plan(plan)).items():
+    done, left = session.made_before(touchstone.read_plan(plan))
+    print(f"{len(done)} touches come from the session, {len(left)} are made now")
+    for (thing, face), rows in client.rig.groups(left).items():
         client.rig.prepare(thing, face)  # asks you to put it down, where the rig cannot
         done += [session.touch(row) for row in rows]
 touchstone.write_measurements(output, done, force=True)

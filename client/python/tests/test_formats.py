@@ -21,6 +21,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 Image = pytest.importorskip("PIL.Image")
 
 from touchstone.formats import FORMATS, export  # noqa: E402
+from touchstone.formats.datasets import open_dataset  # noqa: E402
 
 ROWS = 1000
 _SPEC = ["--objects", "lat00,lat20", "--samples", str(ROWS), "--seed", "3", "--image", "12x8", "--format", "rgb", "--depth", "--mask",
@@ -58,6 +59,18 @@ def _noisy(folder):
     path.write_text("touchstone: model/1\nname: noisy\nend_effector: {fingers: 3, spacing_mm: 30}\neffects:\n"
                     "  - gaussian_noise: {sigma_us: 5000}\n  - missed_contact: {probability: 0.1}\n")
     return path
+
+
+def test_descriptors_that_stand_in_a_folders_csv_are_exported(run, tmp_path):
+    """A dataset of descriptors without contact times."""
+    read = {}
+    for format in ("webdataset", "folder"):
+        done = run("stream", "--objects", "lat20", "--samples", "20", "--columns", "descriptor", "--model", _noisy(tmp_path), "--to", format,
+                   "--out", tmp_path / format, "--quiet")
+        assert done.returncode == 0, done.stderr
+        read[format] = np.concatenate([batch["descriptor_us"] for batch in open_dataset(tmp_path / format).batches()])
+    np.testing.assert_array_equal(read["folder"], read["webdataset"])
+    assert np.isnan(read["folder"]).any() and read["folder"].shape == (20, 3)
 
 
 @pytest.fixture(scope="module")

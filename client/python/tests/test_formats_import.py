@@ -1,6 +1,7 @@
 """Recordings of other tools as measured sets. The writers are those tools' own packages; what must come out is the set of touches
 that was written into them."""
 
+import dataclasses
 import json
 import math
 import os
@@ -135,6 +136,19 @@ def test_a_recording_of_this_program_comes_back(rows, run, tmp_path):
         "target": {"field": "command.target_m", "unit": "m"}, "approach": {"field": "command.approach"}, "lateral": {"field": "command.lateral"},
         "standoff": {"field": "command.standoff_m"}, "speed": {"field": "command.speed_m_s"}})
     _same(tmp_path / "again.csv", rows)
+
+
+@pytest.mark.parametrize("to", ["parquet", "lerobot"])
+def test_covariates_come_back_from_an_export(rows, run, tmp_path, to):
+    """Above all that an emulator made the touches."""
+    emulated = {"cov_emulated": np.ones(1), "cov_room_degC": np.array([21.5])}
+    made = [dataclasses.replace(row, command=dataclasses.replace(row.command, covariates=emulated)) for row in rows[:20]]
+    touchstone.write_measurements(tmp_path / "set.csv", made)
+    export(tmp_path / "set.csv", tmp_path / "out", to=to)
+    done = run("import", tmp_path / "out", "-o", tmp_path / "again.csv")
+    assert done.returncode == 0, done.stderr
+    for row in _same(tmp_path / "again.csv", made):
+        assert {name: values.tolist() for name, values in row.command.covariates.items()} == {"cov_emulated": [1], "cov_room_degC": [21.5]}
 
 
 # --- ROS 2

@@ -140,6 +140,30 @@ def test_the_touches_of_a_damaged_journal_are_saved(whole, run, tmp_path):
     assert [row.touch for row in touchstone.read_plan(tmp_path / "saved.csv")] == [row.touch for row in rows if row.touch != 20]
 
 
+def test_all_sessions_of_a_journal_are_read_and_saved(whole, run, tmp_path):
+    journal = tmp_path / "rig.db"
+    for name in ("monday", "tuesday"):
+        assert run("session", "import", whole / "set.csv", "-o", journal, "--session", name).returncode == 0
+    done = run("verify", journal)
+    assert done.returncode == 0 and "is whole: 96 touches in 2 sessions" in done.stderr, done.stderr
+    assert recover(journal, tmp_path / "saved.db").saved == "96 touches of 2 sessions"
+    assert verify(tmp_path / "saved.db").saved == "96 touches in 2 sessions"
+    done = run("recover", journal, "-o", tmp_path / "saved.csv")
+    assert done.returncode == 2 and "2 sessions (monday, tuesday), which a .csv cannot hold" in done.stderr
+
+
+def test_a_file_that_is_no_journal_is_named_so(run, tmp_path):
+    (tmp_path / "junk.db").write_bytes(b"junk" * 100)
+    done = run("verify", tmp_path / "junk.db")
+    assert done.returncode == 4 and "it is not an SQLite file" in done.stderr
+
+
+def test_the_lines_of_a_spreadsheet_are_counted_as_import_reads_them(whole, tmp_path):
+    text = (whole / "set.csv").read_text()
+    (tmp_path / "set.csv").write_bytes(text.replace("\n", "\r\n\r\n").encode("utf-16"))
+    assert verify(tmp_path / "set.csv").saved == "48 touches"
+
+
 def test_the_lines_before_the_cut_of_a_measurement_file_are_saved(whole, tmp_path):
     text = (whole / "set.csv").read_text()
     cut = tmp_path / "set.csv"

@@ -53,6 +53,24 @@ def test_a_slice_is_a_list(samples, whole):
     expect_these(samples[::-300], whole, [999, 699, 399, 99])
 
 
+def test_a_mask_selects_as_in_numpy(samples, whole):
+    wanted = whole["object"] == 1
+    for mask in (wanted, wanted.tolist()):
+        expect_these(samples[mask], whole, np.flatnonzero(wanted))
+
+
+@pytest.mark.parametrize("index, words", [(np.ones(999, bool), "mask of 999 entries for 1000 samples"), ([True, 3], "mask of 2 entries"),
+                                          (True, "no whole number"), (np.True_, "no whole number")])
+def test_a_mask_of_another_length_and_a_single_bool_are_refused(samples, index, words):
+    with pytest.raises(touchstone.InvalidRequest, match=words):
+        samples[index]
+
+
+def test_true_is_no_number_of_samples(server):
+    with pytest.raises(touchstone.InvalidRequest, match="samples is True, not a whole number"):
+        touchstone.connect(server.target).samples(**{**OPTIONS, "samples": True})
+
+
 def test_the_length_is_the_number_of_samples(samples):
     assert len(samples) == 1000
     assert sum(1 for _ in samples) == 1000

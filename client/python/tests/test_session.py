@@ -17,6 +17,8 @@ from touchstone.v1 import (
     control_pb2_grpc,
     rig_pb2,
     rig_pb2_grpc,
+    sessions_pb2,
+    sessions_pb2_grpc,
     source_pb2,
     source_pb2_grpc,
     types_pb2,
@@ -37,16 +39,18 @@ def _eventually(done):
         time.sleep(0.005)
 
 
-class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, rig_pb2_grpc.RigServicer):
+class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, rig_pb2_grpc.RigServicer,
+              sessions_pb2_grpc.SessionsServicer):
     """Grants leases, answers touches under their ids, and fails where it is told to."""
 
     def __init__(self):
         self.window_s, self.holder, self.epoch, self.renewals, self.released = 30.0, "", 0, 0, 0
         self.failures, self.stale, self.state = [], False, control_pb2.SOURCE_STATE_IDLE
         self.touches, self.mounted, self.stopped, self.resets = [], ("", rig_pb2.UP_FACE_UNSPECIFIED), [], []
+        self.emulated, self.homes, self.csv = False, 0, ""
         self.server = grpc.server(concurrent.futures.ThreadPoolExecutor(8))
         for add in (source_pb2_grpc.add_SourceServicer_to_server, control_pb2_grpc.add_ControlServicer_to_server,
-                    rig_pb2_grpc.add_RigServicer_to_server):
+                    rig_pb2_grpc.add_RigServicer_to_server, sessions_pb2_grpc.add_SessionsServicer_to_server):
             add(self, self.server)
         self.target = f"127.0.0.1:{self.server.add_insecure_port('127.0.0.1:0')}"
         self.server.start()
@@ -102,7 +106,17 @@ class FakeRig(source_pb2_grpc.SourceServicer, control_pb2_grpc.ControlServicer, 
         return source_pb2.TouchResponse(results=results)
 
     def GetRig(self, request, context):
-        return rig_pb2.RigState(object=self.mounted[0], up_face=self.mounted[1])
+        return rig_pb2.RigState(object=self.mounted[0], up_face=self.mounted[1], emulated=self.emulated)
+
+    def Home(self, request, context):
+        self.homes += 1
+        return self.GetRig(request, context)
+
+    def ExportSession(self, request, context):
+        if not self.csv:
+            context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session '{request.name}'")
+        for at in range(0, len(self.csv), 100):
+            yield sessions_pb2.ExportSessionResponse(csv=self.csv[at : at + 100].encode())
 
     def MountObject(self, request, context):
         self.mounted = (request.object, request.up_face)
@@ -247,6 +261,11 @@ def test_a_person_releases_the_stop(rig, rig_client):
     assert [reason for _, reason in rig.resets] == ["cable freed"] and rig.resets[0][0]
 
 
+def test_a_source_without_a_rig_has_no_stop_to_release(client):
+    with pytest.raises(touchstone.Refused, match="is a virtual source, which has no rig"):
+        client.rig.reset("cable freed")
+
+
 def test_power_on_carries_a_lease(rig, rig_client):
     rig_client.rig.power_on()
     assert rig.powered_with == "token1"
@@ -276,11 +295,53 @@ def test_rows_are_grouped_by_object_and_up_face(rig, rig_client, plan):
 def test_a_person_is_asked_only_for_what_does_not_lie_so(rig, rig_client):
     asked = []
     for _ in range(2):
-        rig_client.rig.prepare("lat20", "-x", lambda *what: asked.append(what))
-    assert asked == [("lat20", "-x")]
+        rig_client.rig.prepare("lat20", "-x", lambda *what: asked.append((*what, rig.homes)))
+    assert asked == [("lat20", "-x", 1)], "the arm went home first"
     assert rig.mounted == ("lat20", rig_pb2.UP_FACE_MINUS_X)
     with pytest.raises(touchstone.InvalidRequest, match="up_face"):
         rig_client.rig.mount("lat20", "up")
+
+
+def test_impossible_touches_are_refused_by_name_unless_they_may_be_left_out(rig_client, plan):
+    plan.write_text(_PLAN.replace("\n8,lat00,20,60,0,", "\n8,lat00,20,60,5,"))
+    rows = touchstone.read_plan(plan)
+    with pytest.raises(touchstone.Refused, match=r"1 of 3 touches are impossible here: touch 8 of lat00: .*skip_impossible=True"):
+        rig_client.rig.groups(rows)
+    with pytest.warns(UserWarning, match="touch 8 of lat00"):
+        groups = rig_client.rig.groups(rows, skip_impossible=True)
+    assert [row.touch for part in groups.values() for row in part] == [0, 7]
+    with pytest.raises(touchstone.Refused, match="Nothing was moved; change the plan"):
+        rig_client.rig.groups(rows[2:], skip_impossible=True)
+
+
+def test_nothing_is_not_written_over_a_set(tmp_path):
+    (tmp_path / "set.csv").write_text("kept")
+    with pytest.raises(touchstone.InvalidRequest, match="no touch to write"):
+        touchstone.write_measurements(tmp_path / "set.csv", [])
+    assert (tmp_path / "set.csv").read_text() == "kept"
+
+
+def test_rows_of_an_emulated_rig_say_so_and_those_of_a_real_one_do_not(rig, rig_client, plan):
+    rows = touchstone.read_plan(plan)
+    for rig.emulated in (True, False):
+        with rig_client.session("monday") as session:
+            [row] = [session.touch(row) for row in rows[:1]]
+            # A plan that was made from an emulated set makes no emulated touches.
+            again = session.touch(row)
+        assert [("cov_emulated" in made.command.covariates) for made in (row, again)] == [rig.emulated] * 2
+        assert row.command.covariates["cov_temperature"].tolist() == [21.5]
+
+
+def test_what_a_session_has_is_told_from_what_is_still_to_be_made(rig, rig_client, plan, tmp_path):
+    rows = touchstone.read_plan(plan)
+    with rig_client.session("monday") as session:
+        assert session.made_before(rows) == ([], rows)
+        made = [session.touch(row) for row in rows[:2]]
+        touchstone.write_measurements(tmp_path / "set.csv", made)
+        rig.csv = (tmp_path / "set.csv").read_text()
+        before, left = session.made_before(rows)
+    assert [row.touch for row in before] == [0, 7] and [row.touch for row in left] == [8]
+    assert before[0].time_us == made[0].time_us
 
 
 def test_the_example_runs(rig, plan, tmp_path):

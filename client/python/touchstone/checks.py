@@ -14,6 +14,8 @@ from .errors import InvalidRequest
 def whole_number(name: str, value: Any, minimum: int, maximum: int) -> int:
     """The value as an int within bounds, or InvalidRequest naming both."""
     try:
+        if isinstance(value, bool):  # True is no 1 of anybody
+            raise TypeError
         number = operator.index(value)
     except TypeError:
         raise InvalidRequest(f"{name} is {value!r}, not a whole number.") from None

@@ -74,8 +74,8 @@ _BROKEN = "the connection broke in the middle of an answer. Ask again; if it com
 
 
 # What gRPC itself answers where a service is not there comes without a word.
-_NOT_OFFERED = ("this source does not offer that; only a rig has an arm: a recorded session or a touchstone-server has "
-                "none")
+_NOT_OFFERED = ("this source does not offer that: models, effects and diagnoses are a touchstone-server's, an arm's motions "
+                "a rig's, through its touchstone-gateway")
 
 
 def from_rpc(error: grpc.RpcError, target: str, request: Any = None) -> TouchstoneError:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Callable
 
 from . import checks
+from .errors import Refused
 from .lease import holder
 from .measurements import Row
 from .plans import Touches, checked_touches
@@ -23,6 +25,7 @@ _FACES = {
 }
 _FACE_NAMES = {number: name for name, number in _FACES.items()}
 _CHECKS_A_REQUEST = 100
+_NAMED = 20  # impossible touches
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +60,14 @@ class Rig:
         return self._client.stop(reason)
 
     def reset(self, reason: str) -> control_pb2.State:
-        """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease."""
+        """Releases a stop, for a person who has made sure that the rig may move. Moves nothing; ends the lease.
+
+        Raises:
+          Refused: the source is no rig; a stop there ends what runs and holds nothing.
+        """
+        if not self._client.is_physical:
+            raise Refused(f"{self._client.target} is a {self._client.describe().kind} source, which has no rig: a stop ends what runs there "
+                          "and holds nothing, so there is none to release.")
         request = control_pb2.ResetRequest(holder=holder(), reason=reason)
         state: control_pb2.State = self._client.call(_CONTROL, "Reset", request, repeat=False)
         return state
@@ -84,11 +94,12 @@ class Rig:
         return state
 
     def prepare(self, object: str, up_face: str, ask: Callable[[str, str], None] = _ask) -> None:
-        """mount(), if it does not lie so; where a person must put it down, ask(object, up_face) first."""
+        """mount(), if it does not lie so. Where a person must put it down the arm goes home, then ask(object, up_face)."""
         state = self.status()
         if (state.object, _FACE_NAMES.get(state.up_face, "")) == (object, up_face):
             return
         if not state.mounts_itself:
+            self.home()
             ask(object, up_face)
         self.mount(object, up_face)
 
@@ -101,13 +112,30 @@ class Rig:
             result += [TouchCheck(c.possible, c.reason, _FACE_NAMES.get(c.up_face, ""), c.duration_s) for c in reply.checks]
         return result
 
-    def groups(self, rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
-        """The rows that are possible, by (object, up_face), in the order of the plan; what lies there comes first."""
+    def groups(self, rows: Sequence[Row], skip_impossible: bool = False) -> dict[tuple[str, str], list[Row]]:
+        """The rows by (object, up_face), in the order of the plan; what lies there comes first. Nothing moves.
+
+        Args:
+          skip_impossible: leave out touches that the rig cannot make, with a UserWarning.
+
+        Raises:
+          Refused: touches are impossible here, without skip_impossible; or all of them are.
+        """
         groups: dict[tuple[str, str], list[Row]] = {}
+        impossible: list[str] = []
         for row in rows:
             [check] = self.check(row.object, row.command)
             if check.possible:
                 groups.setdefault((row.object, check.up_face), []).append(row)
+            else:
+                impossible.append(f"touch {row.touch} of {row.object}: {check.reason}")
+        if impossible:
+            names = "; ".join(impossible[:_NAMED]) + (f"; and {len(impossible) - _NAMED} more" if len(impossible) > _NAMED else "")
+            said = f"{len(impossible)} of {len(rows)} touches are impossible here: {names}"
+            if not skip_impossible or not groups:
+                raise Refused(f"{said}. Nothing was moved; change the plan"
+                              + ("." if not groups else ", or leave them out with skip_impossible=True."))
+            warnings.warn(f"{said}. They are left out.", stacklevel=2)
         state = self.status()
         objects = list(dict.fromkeys(row.object for row in rows))
         mounted = (state.object, _FACE_NAMES.get(state.up_face, ""))

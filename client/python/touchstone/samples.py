@@ -64,12 +64,12 @@ class Samples(Sequence[Mapping[str, Any]]):
         if isinstance(index, slice):
             return self._batch(range(*index.indices(len(self))))
         if isinstance(index, (Sequence, np.ndarray)) and getattr(index, "ndim", 1) == 1:
-            return self._batch([self._checked(i) for i in index])
+            return self._batch(self._selected(index))
         return sample_of(self._batch([self._checked(index)]), 0)
 
     def __getitems__(self, indices: Sequence[int]) -> list[Mapping[str, Any]]:
         """A list of samples for one request: what PyTorch's DataLoader asks for if it is there."""
-        batch = self._batch([self._checked(i) for i in indices])
+        batch = self._batch(self._selected(indices))
         return [sample_of(batch, row) for row in range(batch.rows)]
 
     def __iter__(self) -> Iterator[Mapping[str, Any]]:
@@ -101,7 +101,18 @@ class Samples(Sequence[Mapping[str, Any]]):
         if state["_header"]:
             self._header = source_pb2.DatasetHeader.FromString(state["_header"])
 
+    def _selected(self, index: Sequence[int] | NDArray[Any]) -> list[int]:
+        """A list of numbers, or as in NumPy a mask: True for each sample that is wanted."""
+        masks = [isinstance(i, (bool, np.bool_)) for i in index]
+        if not any(masks):
+            return [self._checked(i) for i in index]
+        if not all(masks) or len(masks) != len(self):
+            raise InvalidRequest(f"a mask of {len(masks)} entries for {len(self)} samples; a bool for each was expected, and nothing else.")
+        return [number for number, wanted in enumerate(index) if wanted]
+
     def _checked(self, index: Any) -> int:
+        if isinstance(index, (bool, np.bool_)):
+            raise InvalidRequest(f"index {index!r} is no whole number, no list of them and no slice.")
         try:
             number = operator.index(index)
         except TypeError:

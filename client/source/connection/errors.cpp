@@ -9,8 +9,8 @@ absl::Status FromGrpc(const grpc::Status& status) {
   // What gRPC itself answers where a service is not there comes without a word.
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_message().empty())
     return absl::UnimplementedError(
-        "this source does not offer that; only a rig has an arm: a recorded session or a "
-        "touchstone-server has none");
+        "this source does not offer that: models, effects and diagnoses are a touchstone-server's, an arm's "
+        "motions a rig's, through its touchstone-gateway");
   return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
 }
 

@@ -115,6 +115,16 @@ absl::StatusOr<v1::RigState> LeasedSource::Mount(const std::string& object, v1::
   return Call(connection_->rig(), &v1::Rig::Stub::MountObject, &request);
 }
 
+absl::Status LeasedSource::EnsureMounted(const v1::RigState& state, const std::string& object,
+                                         v1::UpFace up_face, const std::function<absl::Status()>& ask) {
+  if (state.object() == object && state.up_face() == up_face) return absl::OkStatus();
+  if (!state.mounts_itself()) {
+    TOUCHSTONE_RETURN_IF_ERROR(Home().status());
+    TOUCHSTONE_RETURN_IF_ERROR(ask());
+  }
+  return Mount(object, up_face).status();
+}
+
 absl::StatusOr<v1::RigState> LeasedSource::PowerOn() {
   v1::PowerOnRequest request;
   return Call(connection_->rig(), &v1::Rig::Stub::PowerOn, &request);

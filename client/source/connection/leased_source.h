@@ -40,6 +40,10 @@ class LeasedSource {
   // reconnect_s; one without is not where something moves, since it is unknown which touches were made.
   absl::StatusOr<v1::TouchResponse> Touch(v1::TouchRequest request);
   absl::StatusOr<v1::CaptureResponse> Capture(v1::CaptureRequest request);
+  // Where it does not lie so, by `state`: the rig changes it, or the arm goes home, then `ask` lets a person put it down, and
+  // the source is told. Nobody is asked before the arm is at home.
+  absl::Status EnsureMounted(const v1::RigState& state, const std::string& object, v1::UpFace up_face,
+                             const std::function<absl::Status()>& ask);
   absl::StatusOr<v1::RigState> Mount(const std::string& object, v1::UpFace up_face);
   absl::StatusOr<v1::RigState> PowerOn();
   absl::StatusOr<v1::RigState> Home();

@@ -25,6 +25,7 @@ from touchstone.training import (
     statistics,
 )
 from touchstone.training.context import Context
+from touchstone.training.emulated_rig import EmulatedRig
 from touchstone.training.experiment import Experiment, experiments
 from touchstone.training.result import Comparison, Estimate, Figure, Result, Table
 from touchstone.training.settings import Settings
@@ -53,15 +54,34 @@ def test_a_mistake_is_named_in_words(tmp_path, monkeypatch, arguments, says):
     assert raised.value.code not in (0, None) and says in f"{told.getvalue()}{raised.value.code}"
 
 
-def test_an_experiment_runs_to_its_report(tmp_path):
+def test_an_experiment_runs_to_its_report(tmp_path, monkeypatch):
     with touchstone.connect() as client:
-        # The rig of this run is another simulator, which takes no time: the emulated one is tried below.
-        training("curvature_histograms", "--quick", "--server", client.target, "--rig", client.target, "--out", tmp_path, check=0)
+        # The rig of this run is another simulator, which takes no time, and which no user may name: the emulated one is tried below.
+        monkeypatch.setattr(command, "_check_rig", lambda target, is_real: None)
+        monkeypatch.setattr(sys, "argv", ["touchstone.training", "curvature_histograms", "--quick", "--server", client.target, "--rig",
+                                          client.target, "--out", str(tmp_path)])
+        assert command.main() == 0
     (found,) = json.loads((tmp_path / "report.json").read_text())["experiments"]
     assert found["name"] == "curvature_histograms" and found["words"]
     for figure in found["figures"]:
         assert (tmp_path / figure["file"]).read_text().lstrip().startswith("<")
     assert "Histograms of local curvature" in (tmp_path / "report.html").read_text()
+
+
+def test_a_simulator_is_no_rig(tmp_path):
+    with touchstone.connect() as client:
+        done = training("all", "--rig", client.target, "--out", tmp_path / "out")
+    assert done.returncode != 0 and "this is a virtual source, which has no arm" in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_emulated_rig_is_not_called_real(tmp_path):
+    rig = EmulatedRig("", ["--no-camera"])
+    try:
+        done = training("all", "--rig", rig.client.target, "--rig-is-real", "--out", tmp_path / "out")
+    finally:
+        rig.stop()
+    assert done.returncode != 0 and "says that its rig is emulated" in done.stderr and not (tmp_path / "out").exists()
 
 
 def test_a_source_that_does_not_answer_is_named_without_a_traceback(tmp_path):

@@ -126,13 +126,12 @@ absl::Status TouchRun::TouchAll(client::Connection* rig, client::LeasedSource* s
       client::UpFaceWord(state.up_face()));
   for (const client::RigGroup& group : groups) {
     TOUCHSTONE_ASSIGN_OR_RETURN(state, look());
-    if (state.object() != group.object || client::UpFaceWord(state.up_face()) != group.up_face) {
-      if (!state.mounts_itself())
-        TOUCHSTONE_RETURN_IF_ERROR(
-            events.ask(client::RestingFaceRequest(group.object, group.up_face, state.object())));
-      if (!events.go_on()) return absl::CancelledError("stopped");
-      TOUCHSTONE_RETURN_IF_ERROR(source->Mount(group.object, client::UpFaceOf(group.up_face)).status());
-    }
+    TOUCHSTONE_RETURN_IF_ERROR(
+        source->EnsureMounted(state, group.object, client::UpFaceOf(group.up_face), [&]() -> absl::Status {
+          TOUCHSTONE_RETURN_IF_ERROR(
+              events.ask(client::RestingFaceRequest(group.object, group.up_face, state.object())));
+          return events.go_on() ? absl::OkStatus() : absl::CancelledError("stopped");
+        }));
     for (const size_t k : group.rows) {
       if (!events.go_on()) return absl::CancelledError("stopped");
       const client::PlannedRow& row = rows_[k];

@@ -182,12 +182,15 @@ class Rig : public source::RigDevice {
   // Notes in the audit log why a touch did not begin, once for each that is refused again and again; returns why.
   absl::Status Refused(const source::TouchCommand& command, const absl::Status& why);
   absl::Status PowerUp(const source::MotionGuard& guard);
+  // Where another object or another resting face is needed the arm goes home first; then the mount command changes it, or
+  // FAILED_PRECONDITION tells a person what to put down.
   absl::Status EnsureMounted(const std::string& object, calibration::UpFace up_face,
                              const source::MotionGuard& guard);
   // What lies on the fixture now, in the journal and the audit log.
   absl::Status NoteMounted(const std::string& object, calibration::UpFace up_face);
   absl::Status NoteNothingMounted();
   absl::Status MoveHome(const source::MotionGuard& guard);
+  absl::StatusOr<bool> AtHome() const;
   absl::Status MoveThrough(const std::vector<Eigen::Isometry3d>& poses,
                            const std::vector<std::array<double, 6>>& joints, double duration_s,
                            const source::MotionGuard& guard);

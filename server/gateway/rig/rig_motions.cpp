@@ -2,6 +2,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -231,11 +232,22 @@ absl::Status Rig::MoveHome(const source::MotionGuard& guard) {
   return MoveThrough(path.poses, path.joints, 30, guard);
 }
 
+absl::StatusOr<bool> Rig::AtHome() const {
+  constexpr double kTolerance = 1e-3;  // rad of a joint: half a millimetre at the tip
+  TOUCHSTONE_ASSIGN_OR_RETURN(const arm::ArmState state, parts_.arm->State());
+  const std::array<double, 6>& home_rad = parts_.planner->limits().home_rad;
+  return std::equal(home_rad.begin(), home_rad.end(), state.joints_rad.begin(),
+                    [](double home, double joint) { return std::abs(joint - home) < kTolerance; });
+}
+
 absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace up_face,
                                 const source::MotionGuard& guard) {
   const source::SourceStatus now = Status();
   const std::optional<calibration::UpFace> mounted_face = MountedUpFace();
   if (now.object == object && mounted_face == up_face) return absl::OkStatus();
+  // The tool leaves before anything is moved there, by whomever. A person who is told what to do finds it gone.
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool at_home, AtHome());
+  if (!at_home || !options_.mount_command.empty()) TOUCHSTONE_RETURN_IF_ERROR(MoveHome(guard));
   const std::string face = calibration::UpFaceName(up_face);
   if (options_.mount_command.empty())
     return absl::FailedPreconditionError(absl::StrCat(
@@ -247,8 +259,6 @@ absl::Status Rig::EnsureMounted(const std::string& object, calibration::UpFace u
                                               : ""),
         ": put '", object, "' there with its face ", face, " up, then: touchstone rig mount ", object, " ",
         face));
-  // The tool leaves before anything is moved there.
-  TOUCHSTONE_RETURN_IF_ERROR(MoveHome(guard));
   std::vector<std::string> command = options_.mount_command;
   for (std::string& word : command)
     word = absl::StrReplaceAll(word, {{"{object}", object}, {"{up_face}", face}, {"{placement}", face}});

@@ -15,7 +15,10 @@ class ReplayRigService final : public v1::Rig::Service {
  public:
   ReplayRigService(Resources* resources, LeaseBook* leases, const gateway::bundle::Replay& replay,
                    source::RecordedRig* recorded)
-      : resources_(resources), leases_(leases), rig_(replay.rig), name_(replay.name), recorded_(recorded) {}
+      : resources_(resources), leases_(leases), rig_(replay.rig), name_(replay.name), recorded_(recorded) {
+    // Nobody has to put anything down, nor to keep clear of an arm.
+    rig_.set_mounts_itself(true);
+  }
 
   grpc::Status GetRig(grpc::ServerContext*, const v1::GetRigRequest*, v1::RigState*) override;
   // Possible is what the record has an answer to.

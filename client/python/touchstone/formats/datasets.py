@@ -19,7 +19,8 @@ from ..measurements import VECTORS
 from ..units import lab_array, si_value
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
-_SI_NAMES = {"contact_time_us": "contact_time_s", "target_mm": "target_m", "standoff_mm": "standoff_m", "speed_mm_s": "speed_m_s"}
+_SI_NAMES = {"contact_time_us": "contact_time_s", "descriptor_us": "descriptor_s", "target_mm": "target_m",
+             "standoff_mm": "standoff_m", "speed_mm_s": "speed_m_s"}
 _IN_TEXT = ("target_mm", "approach", "lateral", "standoff_mm", "speed_mm_s")
 _VERIFY = "`touchstone dataset verify` says what is wrong"
 
@@ -91,6 +92,8 @@ class DatasetFolder(Table):
         with open(path / "touches.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         decimals = set(_IN_TEXT)
+        # A dataset without contact times has its descriptors in their columns.
+        in_csv = "contact_time_us" if self.column("contact_time_us") else "descriptor_us"
         pictures = sorted(file for file in path.iterdir() if file.suffix in (".png", ".jpg", ".jpeg"))
         for begin in range(0, len(rows), ROWS_OF_A_BATCH):
             part, samples = rows[begin : begin + ROWS_OF_A_BATCH], []
@@ -100,9 +103,9 @@ class DatasetFolder(Table):
                 sample |= {name: [row[part] for part in parts] for name, parts in VECTORS.items() if parts[0] in row}
                 sample |= {name: row[name] for name in ("standoff_mm", "speed_mm_s") if name in row}
                 times = [row[name] for name in row if name.startswith("t_") and name.endswith("_us")]
-                if times and "contact_time_us" not in sample:
-                    sample["contact_time_us"] = [time or "nan" for time in times]
-                    decimals.add("contact_time_us")
+                if times and in_csv not in sample:
+                    sample[in_csv] = [time or "nan" for time in times]
+                    decimals.add(in_csv)
                 if pictures:
                     sample["image"] = pictures[k].read_bytes()
                 samples.append(sample)

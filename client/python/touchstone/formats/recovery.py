@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import InvalidRequest, Refused
 from ..mcap import ExportError, SessionFile
+from ..plain_csv import read_csv
 from ..whole_file import whole_file
 from . import sessions
 from .table import need
@@ -218,27 +219,56 @@ def _write_mcap(kept: Iterator[Any], out: Any) -> None:
 # --- Sessions
 
 def _journal(path: pathlib.Path, target: pathlib.Path | None) -> Found:
-    """Every touch has a checksum; `session export` checks them all."""
-    with tempfile.TemporaryDirectory(prefix="touchstone-verify-") as folder:
-        exported = pathlib.Path(folder) / "set.csv"
-        why = ""
+    """Every touch has a checksum; `session verify` checks all of a session, and a journal may have several."""
+    try:
+        listed = sessions.ask_program("session", "list", path)["sessions"]
+        unreadable = ""
+    except (InvalidRequest, Refused) as error:
+        listed, unreadable = [], str(error).partition(": ")[2]
+        if target is None:
+            return Found(path, False, "nothing", unreadable)
+    if target is not None:
+        return _saved_journal(path, target, [session["name"] for session in listed], unreadable)
+    lost = []
+    for session in listed:
         try:
-            sessions.run_program("session", "export", path, "-o", exported)
-        except (InvalidRequest, Refused) as error:
-            why = str(error).partition(": ")[2]
-            if target is None:
-                return Found(path, False, "not told before recovery", why)
-            sessions.run_program("session", "export", path, "--skip-damaged", "-o", exported)
-        rows = len(exported.read_text(encoding="utf-8").splitlines()) - 1
-        if target is not None:
+            sessions.ask_program("session", "verify", path, session["name"])
+        except Refused as error:
+            lost.append(str(error).partition(": ")[2])
+    return Found(path, not lost, _counted(listed), "; ".join(lost))
+
+
+def _counted(listed: list[dict[str, Any]]) -> str:
+    """The numbers of `session list`."""
+    touches, done = (sum(session[name] for session in listed) for name in ("touches", "done"))
+    return (f"{touches} touches" + (f" ({done} of them done)" if done < touches else "")
+            + (f" in {len(listed)} sessions" if len(listed) != 1 else ""))
+
+
+def _saved_journal(path: pathlib.Path, target: pathlib.Path, names: list[str], unreadable: str) -> Found:
+    """What is whole of it: one session as .csv or .db, several as .db."""
+    if target.suffix not in (".csv", ".db"):
+        raise InvalidRequest(f"{target}: what a journal has is saved as .csv or .db.")
+    if target.suffix == ".csv" and len(names) > 1:
+        raise InvalidRequest(f"{target}: {path} has {len(names)} sessions ({', '.join(names)}), which a .csv cannot hold together; name a .db, or "
+                             f"write one: touchstone session export {path} NAME --skip-damaged -o {target}.")
+    rows, lost = 0, [unreadable] if unreadable else []
+    with tempfile.TemporaryDirectory(prefix="touchstone-verify-") as folder:
+        saved = pathlib.Path(folder) / "saved.db"
+        for at, name in enumerate(names or [""]):
+            exported = pathlib.Path(folder) / f"{at}.csv"
+            words: list[str | os.PathLike[str]] = ["session", "export", path, *([name] if name else []), "-o", exported]
+            try:
+                sessions.run_program(*words)
+            except (InvalidRequest, Refused) as error:
+                lost.append(str(error).partition(": ")[2])
+                sessions.run_program(*words, "--skip-damaged")
+            rows += len(read_csv(exported)[1])
             if target.suffix == ".db":
-                sessions.run_program("session", "import", exported, "-o", exported.with_suffix(".db"))
-                exported = exported.with_suffix(".db")
-            elif target.suffix != ".csv":
-                raise InvalidRequest(f"{target}: what a journal has is saved as .csv or .db.")
-            with whole_file(target, "wb") as out:
-                out.write(exported.read_bytes())
-    return Found(path, not why, f"{rows} touches", why)
+                sessions.run_program("session", "import", exported, "-o", saved, "--session", name or path.stem)
+        with whole_file(target, "wb") as out:
+            out.write((saved if target.suffix == ".db" else exported).read_bytes())
+    return Found(path, not lost, f"{rows} touches" + (f" of {len(names)} sessions" if len(names) > 1 else ""), "; ".join(lost))
 
 
 def _measurements(path: pathlib.Path, target: pathlib.Path | None) -> Found:
@@ -246,7 +276,7 @@ def _measurements(path: pathlib.Path, target: pathlib.Path | None) -> Found:
     with tempfile.TemporaryDirectory(prefix="touchstone-verify-") as folder:
         def count(file: pathlib.Path) -> int:
             sessions.run_program("session", "import", file, "-o", pathlib.Path(folder) / f"{file.stem}.db")
-            return len(file.read_text(encoding="utf-8").splitlines()) - 1
+            return len(read_csv(file)[1])
 
         why = ""
         try:

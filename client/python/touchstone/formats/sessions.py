@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
 import functools
+import json
 import os
 import pathlib
 import re
@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import InvalidRequest, NotFound, Refused
 from ..measurements import VECTORS, number_in
 from ..own_server import find_server
+from ..plain_csv import read_csv
 from .table import ROWS_OF_A_BATCH, Column, Table, Values, need, sha256_of
 
 _POSES = {f"{when}{name}": tuple(f"{when}{name.removesuffix('_mm')}_{axis}{'_mm' if name.endswith('_mm') else ''}" for axis in "xyz")
@@ -62,18 +63,9 @@ def open_photographs(folder: pathlib.Path) -> MeasuredSet:
 
 
 def _read_csv(path: pathlib.Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            header = next(reader, [])
-            lines = [(reader.line_num, row) for row in reader if row]
-    except UnicodeDecodeError:
-        raise InvalidRequest(f"{path} is not UTF-8 text.") from None
+    header, lines = read_csv(path)
     if not lines:
         raise InvalidRequest(f"{path} has no rows; a header and a row per touch were expected.")
-    for line, row in lines:
-        if len(row) != len(header):
-            raise InvalidRequest(f"{path}:{line}: {len(row)} fields, but the header has {len(header)}.")
     return header, lines
 
 
@@ -132,12 +124,19 @@ def program() -> str:
     raise NotFound("The program touchstone is not in PATH, and reads the journals of sessions. Put it there, or name it in TOUCHSTONE_PROGRAM.")
 
 
-def run_program(*words: str | os.PathLike[str]) -> None:
-    """Runs a command; its own error, if it fails."""
+def ask_program(*words: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a command with --json says; its own error, if it fails."""
+    said: dict[str, Any] = json.loads(run_program(*words, "--json"))
+    return said
+
+
+def run_program(*words: str | os.PathLike[str]) -> str:
+    """Runs a command and gives what it prints; its own error, if it fails."""
     done = subprocess.run([program(), *words, "--quiet"], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         message = done.stderr.strip().removeprefix("touchstone: error: ") or f"exit status {done.returncode}"
         raise (InvalidRequest if done.returncode == 2 else Refused)(f"touchstone {words[0]} {words[1]}: {message}")
+    return done.stdout
 
 
 @contextlib.contextmanager

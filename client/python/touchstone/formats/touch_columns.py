@@ -162,6 +162,13 @@ class TouchColumns:
                 if values is not None:
                     values = np.asarray(values).reshape(len(values), -1)
                     columns |= {f"cov_joint_{k}_deg": values[:, k] for k in range(values.shape[1])}
+        # What an export of ours calls a covariate is one, above all cov_emulated.
+        touches = mapping.touches
+        for field in touches.fields if touches is not None else ():
+            name = field.rpartition(".")[2]
+            values = touches.numbers(field) if touches is not None and name.startswith("cov_") else None
+            if values is not None and values.ndim == 1:
+                columns[name] = np.asarray(values, float)
         said = mapping.entries.get("covariates") or {}
         if not isinstance(said, dict):
             raise InvalidRequest(f"{mapping.origin}: covariates: {said!r}; {{NAME: {{field: ...}}}} was expected.")

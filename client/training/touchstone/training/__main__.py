@@ -84,10 +84,22 @@ def _settings(options: argparse.Namespace) -> Settings:
             sys.exit(str(error))
     if options.rig_is_real and not options.rig:
         sys.exit("--rig-is-real needs --rig HOST:PORT: the rig that is started otherwise is emulated")
+    if options.rig:
+        _check_rig(options.rig, options.rig_is_real)
     if options.seeds is not None and options.seeds < 2:
         sys.exit(f"--seeds {options.seeds}: at least 2 are needed for an interval")
     return Settings(options.out, options.quick, options.seeds or (3 if options.quick else 10), options.seed, options.server,
                     options.rig, options.rig_is_real, options.backbone, options.everyday)
+
+
+def _check_rig(target: str, is_real: bool) -> None:
+    """What the source itself says: whether it is a rig, and whether an emulator stands in for its arm."""
+    with touchstone.connect(target) as client:
+        if not client.is_physical:
+            sys.exit(f"--rig {target}: this is a {client.describe().kind} source, which has no arm; the address of a touchstone-gateway was "
+                     "expected. A simulator is named with --server")
+        if is_real and client.rig.status().emulated:
+            sys.exit(f"--rig-is-real: the gateway at {target} says that its rig is emulated; its data measure nothing, and are called emulated")
 
 
 def _run(experiment: Experiment, context: Context, again: bool) -> Result:
