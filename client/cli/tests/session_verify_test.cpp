@@ -56,7 +56,8 @@ TEST_F(SessionVerifyTest, ATouchThatAKillLeftUnderWayIsCountedAsInTheList) {
     const auto journal =
         session::Journal::Open(Path("session.db"), session::Journal::Mode::kCreateOrReadWrite);
     ASSERT_TRUE(journal.ok()) << journal.status();
-    ASSERT_TRUE((*journal)->Begin("set", "killed", "lat20", "+z", session::CommandBytes(v1::CommandedTouch())).ok());
+    ASSERT_TRUE(
+        (*journal)->Begin("set", "killed", "lat20", "+z", session::CommandBytes(v1::CommandedTouch())).ok());
   }
   const auto listed =
       nlohmann::json::parse(Run({"session", "list", "session.db", "--json"}).out)["sessions"][0];

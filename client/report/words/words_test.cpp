@@ -111,8 +111,7 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
   EXPECT_EQ(NothingMissingWords(CompareReport()), "");
   report.clear_p_nothing_missing();
   report.add_data()->set_kind(v1::DataReport::PHOTOGRAPHS);
-  EXPECT_EQ(NothingMissingWords(report),
-            "P(nothing is missing) is not assessed: the pictures are too few.");
+  EXPECT_EQ(NothingMissingWords(report), "P(nothing is missing) is not assessed: the pictures are too few.");
 }
 
 // An effect of the catalogue that acts in one round: not "in a way that no built-in effect explains".
