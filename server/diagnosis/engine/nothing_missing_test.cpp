@@ -116,6 +116,26 @@ TEST(NothingMissing, IsNotSmallWhereClustersShareTheirErrors) {
   EXPECT_GE(small_apart, 20);
 }
 
+// Whatever rows of a cluster share, and of whatever size.
+TEST(NothingMissing, IsUniformWhereSignsOfClustersAreTurned) {
+  constexpr int kClusters = 24, kRows = 20;
+  std::vector<int> first;
+  for (int c = 0; c <= kClusters; ++c) first.push_back(c * kRows);
+  const Eigen::MatrixXd columns = Normal(kClusters * kRows, 6, 150);
+  LinearHypotheses hypotheses(0, first);
+  for (int j = 0; j < columns.cols(); ++j) hypotheses.Add(columns.col(j));
+  std::vector<double> p;
+  for (int set = 0; set < 300; ++set) {
+    Eigen::VectorXd residual = Normal(kClusters * kRows, 1, 160 + 2 * set);
+    const Eigen::MatrixXd shared = Normal(kClusters, 6, 161 + 2 * set);
+    for (int c = 0; c < kClusters; ++c)
+      residual.segment(first[c], kRows) +=
+          (1 + c % 3) * columns.middleRows(first[c], kRows) * shared.row(c).transpose();
+    p.push_back(WorstOfAll(hypotheses.PValues(DataAndTurned(residual, first, set, kDraws))).p);
+  }
+  ExpectUniform(p);
+}
+
 TEST(NothingMissing, TriesNoColumnsThatSayNothing) {
   LinearHypotheses none;
   none.Add(Eigen::MatrixXd::Zero(kReadings, 2));

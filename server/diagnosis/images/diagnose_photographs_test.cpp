@@ -13,6 +13,7 @@
 
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
+#include "server/diagnosis/engine/uniform_p_values.h"
 #include "server/diagnosis/images/photo_test_set.h"
 
 namespace touchstone::diagnosis::images {
@@ -55,6 +56,27 @@ TEST(DiagnosePhotographs, FindsNothingWhereNothingIsMissing) {
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput({}));
   EXPECT_EQ(d.verdict, engine::Verdict::kAdequate);
   EXPECT_TRUE(d.steps.empty());
+  ASSERT_TRUE(d.nothing_missing);
+  EXPECT_GT(d.nothing_missing->p, 0.01);
+  EXPECT_GT(d.nothing_missing->hypotheses, 20);
+}
+
+TEST(DiagnosePhotographs, HasAUniformPOfNothingMissingWhereNothingIs) {
+  TOUCHSTONE_SECOND_TIER("statistical: 60 sets of pictures");
+  std::vector<double> p;
+  for (uint64_t seed = 100; seed < 160; ++seed) {
+    HiddenCamera rig;
+    rig.seed = seed;
+    p.push_back(Diagnosed(MakePhotoInput(rig)).nothing_missing->p);
+  }
+  engine::ExpectUniform(p);
+}
+
+TEST(DiagnosePhotographs, DoesNotSayOfAFewPicturesWhetherNothingIsMissing) {
+  HiddenCamera rig;
+  rig.objects = {"lat00"};
+  rig.photographs = 7;
+  EXPECT_FALSE(Diagnosed(MakePhotoInput(rig)).nothing_missing);
 }
 
 TEST(DiagnosePhotographs, SaysWhatAPixelIsPredictedWith) {
@@ -62,6 +84,7 @@ TEST(DiagnosePhotographs, SaysWhatAPixelIsPredictedWith) {
   rig.hidden = {{"exposure", {"stops=0.4"}}};
   const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
   ASSERT_EQ(d.steps.size(), 1u) << d.summary;
+  EXPECT_LT(d.nothing_missing->p, 1e-6);
   ASSERT_EQ(d.uncertainty.size(), d.objects.size() + 1);
   const uncertainty::Budget& all = d.uncertainty.back();
   EXPECT_EQ(all.object, "");
