@@ -111,6 +111,11 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
   EXPECT_EQ(NothingMissingWords(CompareReport()), "");
   report.clear_p_nothing_missing();
   report.add_data()->set_kind(v1::DataReport::PHOTOGRAPHS);
+  EXPECT_EQ(
+      NothingMissingWords(report),
+      "P(nothing is missing) is not assessed: touches and photographs were diagnosed one by one, or the "
+      "pictures are too few.");
+  report.mutable_data()->DeleteSubrange(0, report.data_size() - 1);
   EXPECT_EQ(NothingMissingWords(report), "P(nothing is missing) is not assessed: the pictures are too few.");
 }
 
