@@ -63,10 +63,12 @@ def test_permission_bits_are_those_of_open_or_of_the_file_before(tmp_path):
     assert path.stat().st_mode & 0o777 == 0o640
 
 
+_TOUCH = touchstone.touches([dict(target_mm=(0, 0, 0), approach=(0, 0, -1), lateral=(0, 1, 0), standoff_mm=100)])
 _WRITERS = {
     "save": lambda path, **how: Report(diagnosis_pb2.Report()).save(path, **how),
     "save_model": lambda path, **how: Report(diagnosis_pb2.Report(improved_model_yaml="touchstone: model/1\n")).save_model(path, **how),
-    "write_measurements": lambda path, **how: touchstone.write_measurements(path, [], **how),
+    "write_measurements": lambda path, **how: touchstone.write_measurements(
+        path, [touchstone.Row(0, "lat20", _TOUCH, (1.0, 2.0, 3.0))], **how),
 }
 
 

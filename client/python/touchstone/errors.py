@@ -75,7 +75,7 @@ _BROKEN = "the connection broke in the middle of an answer. Ask again; if it com
 
 # What gRPC itself answers where a service is not there comes without a word.
 _NOT_OFFERED = ("this source does not offer that: models, effects and diagnoses are a touchstone-server's, an arm's motions "
-                "a rig's, through its touchstone-gateway")
+                "a rig's, through its touchstone-gateway; a recorded session has none of them")
 
 
 def from_rpc(error: grpc.RpcError, target: str, request: Any = None) -> TouchstoneError:

@@ -10,7 +10,7 @@ absl::Status FromGrpc(const grpc::Status& status) {
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_message().empty())
     return absl::UnimplementedError(
         "this source does not offer that: models, effects and diagnoses are a touchstone-server's, an arm's "
-        "motions a rig's, through its touchstone-gateway");
+        "motions a rig's, through its touchstone-gateway; a recorded session has none of them");
   return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
 }
 
