@@ -214,7 +214,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
                               selection::QualityOf(*workspace, selection.initial_model, before));
-  double judged_s = quality.rmse;  // of the touches that are judged
+  double assessed_s = quality.rmse;  // of the touches that are assessed
   selection::SetError(compared_s, &quality);
   diagnosis.data[0].initial = report::InMicroseconds(quality);
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, &selection));
@@ -230,10 +230,10 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   if (ladder.surface_as_given) {
     const engine::Quality beside = selection::QualityWithoutSurface(*workspace, selection.initial_model);
     data.initial->lack_of_fit_p = beside.lack_of_fit_p;
-    judged_s = std::min(judged_s, beside.rmse);
+    assessed_s = std::min(assessed_s, beside.rmse);
   }
   // An error and the floor below it are of the same touches.
-  data.reducible_share = report::ReducibleShare(*data.noise_floor, judged_s * kMicrosecondsPerSecond);
+  data.reducible_share = report::ReducibleShare(*data.noise_floor, assessed_s * kMicrosecondsPerSecond);
   report::SetNothingMissing(engine::WorstOfAll(selection.tried), &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   // A part of a joint diagnosis describes what the model had left before anything was put in place.

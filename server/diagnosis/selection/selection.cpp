@@ -247,7 +247,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
         workspace->experiment, MakeCandidates(workspace->input, *workspace->searched), engine::SearchRules(),
         progress);
     engine::GivenAndEffects columns;
-    // Of the touches that are judged: outliers that left are no hypothesis, what a part of the session has is one.
+    // Of the touches that are assessed: outliers that left are no hypothesis, what a part of the session has is one.
     if (!group) {
       TOUCHSTONE_ASSIGN_OR_RETURN(columns, engine::ColumnsOfEffects(*result.search, *workspace->input.model));
       TOUCHSTONE_ASSIGN_OR_RETURN(tried, TryOnTouches(*workspace, columns));

@@ -16,7 +16,7 @@ struct FingerScatter {
 };
 
 // The finger that differs most from the mean of the others, if by more than a sixth of their error and by no chance
-// (p < 1e-3). Judged by differences of squares within touches, summed by pose or by
+// (p < 1e-3). Assessed by differences of squares within touches, summed by pose or by
 // stretches of the session, whichever scatter more: heavy tails, repeats that share an error and correlated noise alarm no more
 // often. Nothing of one or two fingers, whose residuals are of equal size in every touch.
 std::optional<FingerScatter> FindFingerScatter(const touches::Observations& observations,

@@ -217,14 +217,14 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
-  // The level that a model has beside kinds of noise that are not judged here says nothing by itself.
+  // The level that a model has beside kinds of noise that are not assessed here says nothing by itself.
   const touches::DeclaredNoise declared = DeclaredNoiseOf(given);
   const bool level_alone = !declared.slope && !declared.degrees_of_freedom && !declared.length_sigma_m &&
                            declared.channel_sigma_s.empty();
-  const bool judged = level_alone || !(in_time || noise.shape_hidden);
-  if (judged && sigma.absent)
+  const bool assessed = level_alone || !(in_time || noise.shape_hidden);
+  if (assessed && sigma.absent)
     writer.Remove(model::EffectRole::kNoiseLevel);
-  else if (judged && scatter &&
+  else if (assessed && scatter &&
            (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kMinFloorUs))
     writer.Write(model::EffectRole::kNoiseLevel, sigma);
   writer.WriteOrRemove(model::EffectRole::kNoiseGrowth, noise.slope);

@@ -293,7 +293,7 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   const double ratio_error = LogError(course, ratio, time_s, false);
   const double time_error = LogError(course, ratio, time_s, true);
   constexpr double kMaxStep = 2;  // of a logarithm
-  // How large the noise without memory is hangs on the ratio and the time too.
+  // The noise without memory depends on the ratio and the time too.
   const double by_ratio_s =
       Likelihood(course, ratio * std::exp(std::min(ratio_error, kMaxStep)), time_s).white_s - best.white_s;
   const double by_time_s =

@@ -22,9 +22,8 @@ constexpr double kDelayLengthNats = 3;  // by which a delay of the travel must b
 constexpr double kOneDelayedNats = 3;   // one finger of all of them,
 constexpr double kDelayScalesNats = 3;  // and noise of the kinds found without delays of plain noise
 constexpr size_t kMinDelayTouches = 60;
-constexpr size_t kMaxDelayTouches = 800;   // of a large set, evenly
-constexpr double kMinOfEachValue = 10;     // readings
-constexpr double kDelaySpeedSpread = 1.2;  // largest over smallest, for a length to be told from a time
+constexpr size_t kMaxDelayTouches = 800;  // of a large set, evenly
+constexpr double kMinOfEachValue = 10;    // readings
 
 std::string DelayInWords(const RandomDelay& found, int fingers) {
   const std::string whose = found.noise.finger < 0
@@ -66,17 +65,14 @@ std::vector<ReadingGroup> ThreeFingersOf(const std::vector<ReadingGroup>& all) {
   return kept;
 }
 
-bool SpeedsDiffer(const std::vector<ReadingGroup>& groups) {
-  const auto [low, high] = std::minmax_element(
-      groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.slowness < b.slowness; });
-  return high->slowness > kDelaySpeedSpread * low->slowness;
-}
-
 // Beside noise of these scales: the best two values, and the shape that says more, if one does.
 class DelaySearch {
  public:
   DelaySearch(const std::vector<ReadingGroup>& groups, int fingers, double without_nats)
-      : groups_(groups), fingers_(fingers), without_nats_(without_nats), speeds_(SpeedsDiffer(groups)) {}
+      : groups_(groups),
+        fingers_(fingers),
+        without_nats_(without_nats),
+        speeds_(touches::SpeedsDiffer(groups)) {}
 
   std::optional<RandomDelay> Best(NoiseModel scales) const {
     const double none_nats = touches::ProfileSigma(groups_, &scales);

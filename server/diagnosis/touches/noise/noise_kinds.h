@@ -54,7 +54,7 @@ struct NoiseFindings {
   std::vector<NoiseEstimate> channel_sigma_s;
   bool channels_absent = false;
   bool shape_hidden =
-      false;         // ticks make so much of the scatter that kinds which a model declares cannot be judged
+      false;         // ticks make so much of the scatter that kinds which a model declares cannot be assessed
   NoiseModel model;  // that describes the residuals best
   std::vector<int> outliers;  // indices of groups with a reading that no noise of the others explains
   // Those of them that are about as far off as the farthest: a fit that has followed one makes its repeats look like others.

@@ -98,6 +98,13 @@ double RelativeScale(const ReadingGroup& group, size_t i, const NoiseModel& mode
   return scale;
 }
 
+bool SpeedsDiffer(const std::vector<ReadingGroup>& groups) {
+  constexpr double kMinSlownessSpread = 1.2;  // largest over smallest
+  const auto [low, high] = std::minmax_element(
+      groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.slowness < b.slowness; });
+  return high->slowness > kMinSlownessSpread * low->slowness;
+}
+
 double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
   double sum = 0;
   if (model.shape == NoiseShape::kGaussian) {

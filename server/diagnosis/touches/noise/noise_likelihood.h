@@ -33,6 +33,9 @@ struct NoiseModel {
 // Scale of reading i of a group over sigma.
 double RelativeScale(const ReadingGroup& group, size_t i, const NoiseModel& model);
 
+// Whether the touches' speeds differ by so much that a noise of lengths can be told from one of times. `groups`: at least one.
+bool SpeedsDiffer(const std::vector<ReadingGroup>& groups);
+
 double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model);
 
 // The same with the best sigma near model.sigma_s, which is set.

@@ -15,10 +15,9 @@ constexpr double kEnterNats = 10;      // gain in log likelihood that a further 
 constexpr double kSimplerNats = 1;     // that a noise of times beside one of lengths must bring
 constexpr double kKurtosisSigmas = 4;  // of the sample's excess kurtosis before tails are looked at
 constexpr double kMinSlope = 0.02, kMaxSlope = 10;
-constexpr double kMaxScale = 8;             // of one channel's noise over another's
-constexpr double kMinSlownessSpread = 1.2;  // largest over smallest, for a noise of lengths to show
-constexpr size_t kMinRepeats = 60;          // groups, for repeats to be asked
-constexpr double kRepeatsShare = 0.25;      // of the gain that repeats must show
+constexpr double kMaxScale = 8;         // of one channel's noise over another's
+constexpr size_t kMinRepeats = 60;      // groups, for repeats to be asked
+constexpr double kRepeatsShare = 0.25;  // of the gain that repeats must show
 constexpr double kRepeatsNats = 3;
 constexpr double kWithoutRepeatsNats = 20;  // gain that a kind needs which no repeat can confirm
 constexpr double kRepeatsKurtosisSigmas = 2;
@@ -106,10 +105,7 @@ bool NoiseSearch::Possible(Kind kind) const {
   if (kind == kGrowth) return true;
   // Two channels show one variance only.
   if (kind == kChannels) return sample_.channels >= 3;
-  const auto [low, high] =
-      std::minmax_element(sample_.groups.begin(), sample_.groups.end(),
-                          [](const auto& a, const auto& b) { return a.slowness < b.slowness; });
-  return high->slowness > kMinSlownessSpread * low->slowness;
+  return SpeedsDiffer(sample_.groups);
 }
 
 double NoiseSearch::Threshold(Kind kind) const {
