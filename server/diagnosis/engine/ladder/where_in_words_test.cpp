@@ -57,7 +57,7 @@ TEST(WhereInWords, NamesTheOneFingerThatDiffers) {
             "Acts on finger m only: the others agree within their errors.");
   EXPECT_EQ(WhereInWords(LengthsMm(-0.3, 0.2, 0.1), SelectedStep()), "");
   // Two that may differ do not agree, though their errors allow it.
-  EXPECT_EQ(WhereInWords(LengthsMm(0.005, -0.001, -0.004), SelectedStep()), "");
+  EXPECT_EQ(WhereInWords(LengthsMm(0.005, -0.00125, -0.00375), SelectedStep()), "");
 }
 
 }  // namespace
