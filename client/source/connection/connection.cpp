@@ -155,6 +155,8 @@ absl::Status Connection::Connect(int server_index) {
   // By its name this is the least time between two attempts; it is also how long an attempt may take, 20 s by itself. The first
   // one is ended below, just before.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, Milliseconds(1.25 * options_.connect_timeout_s));
+  // Otherwise a channel to the same address takes over the connection of the one before, with its pause of up to 1 s.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // A server that was stopped, or whose machine died, sends nothing: it is asked for a sign of life during every call, also
   // where it computes for long and sends no data.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(kKeepaliveS));
