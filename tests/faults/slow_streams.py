@@ -59,7 +59,7 @@ class _Slow:
         self._thread.join()
 
 
-def _round_s(slow: list[_Slow], turns: int = 4) -> float:
+def _round_s(slow: list[_Slow], turns: int = 2) -> float:
     """The time in which each of them gets another batch, over so many turns: where they run at once, those of one turn may all
     come at its end."""
     begin, before = time.monotonic(), [each.batches for each in slow]

@@ -56,13 +56,16 @@ def test_a_server_lives_within_the_memory_limit_of_its_own_cgroup(limit_mib, str
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("name", ["export .h5", pytest.param("import .csv", marks=pytest.mark.second_tier(
-    "long: two hundred kills of an import")), pytest.param("", marks=pytest.mark.second_tier(
-    "repeated: every other command that writes"), id="all")])
-def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(name):
-    # For one command, those of the faults that differ in what the program can still do; the tests in C++ have all of them.
-    faults = [fault for fault in failing_files.FAULTS if not name or fault.name in ("full from then on", "killed")]
-    passes(failing_files.run((name,) if name else (), faults))
+QUICK_FAULTS = ("full from then on", "killed")  # that differ in what the program can still do; the tests in C++ have all of them
+
+
+@pytest.mark.parametrize("command, faults", [
+    *(("export .h5", (fault,)) for fault in QUICK_FAULTS),
+    pytest.param("import .csv", QUICK_FAULTS, marks=pytest.mark.second_tier("long: two hundred kills of an import")),
+    pytest.param("", (), marks=pytest.mark.second_tier("repeated: every other command that writes"), id="all")])
+def test_a_failing_disk_or_a_kill_leaves_whole_files_or_none(command, faults):
+    chosen = [fault for fault in failing_files.FAULTS if not faults or fault.name in faults]
+    passes(failing_files.run((command,) if command else (), chosen))
 
 
 def test_libraries_without_memory_do_not_hang_a_program():
