@@ -41,6 +41,8 @@ def learn(suites, known, broken, save):
                     continue
                 if ended.passed:
                     known.append(test)
+                elif ended.timed_out:
+                    broken.append((runs[run][0].name, runs[run][1]))
                 else:
                     again.append(runs[run])
                 if count % 50 == 0:

@@ -23,6 +23,24 @@ def test_google_tests_learn_what_each_reaches_and_its_tier(program, tmp_path):
     assert (learnt["Count.Multiplies"].tier, learnt["Count.Multiplies"].reached) == (2, [numbers[12, "+="], numbers[15, "*"]])
 
 
+def test_a_test_that_does_not_end_in_time_is_left_out_and_not_run_again():
+    @dataclasses.dataclass
+    class Slow:
+        name: str = "slow"
+        runs: int = 0
+
+        def list(self):
+            return ["whole"]
+
+        def learn(self, name, reached):
+            self.runs += 1
+            return KnownTest(self.name, name, 1), processes.Ended(False, True, -9, "", 600.0)
+
+    slow, known, broken = Slow(), [], []
+    measure.learn({"slow": slow}, known, broken, lambda: None)
+    assert (known, broken, slow.runs) == ([], [("slow", "whole")], 1)
+
+
 def test_google_tests_name_what_failed_crashed_or_did_not_end(program, monkeypatch):
     tests, numbers = program
     known = [KnownTest("all_test", name, 1, 0.0) for name in ("Half.IsHalf", "Between.HasAnEnd", "Hang.Counts", "Crash.OfTheProgram")]
