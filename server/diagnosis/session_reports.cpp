@@ -12,6 +12,7 @@
 #include "server/diagnosis/answers/session_copies.h"
 #include "server/diagnosis/answers/session_poses.h"
 #include "server/diagnosis/answers/session_posterior.h"
+#include "server/diagnosis/answers/session_rests.h"
 #include "server/diagnosis/answers/uncertainty_reports.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/report/join.h"
@@ -242,10 +243,8 @@ class SessionsReporter {
       if (instance.effect->apply && !instance.effect->random())
         input.settled.push_back(engine::NameOf(*instance.effect));
     TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis one, DiagnoseTouches(input, Stretch(from, to)));
-    const Verdict rest = VerdictOfRest(one);
-    if (rest == Verdict::kUnexplained) unexplained_.push_back(s);
-    diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, rest);
-    AddRest(one, s, place);
+    diagnosis_.verdict =
+        report::WorseOf(diagnosis_.verdict, rests_.Add(one, s, &diagnosis_.sessions->changes->models[place]));
     // Of the model that the report ends with, as far as the last session's touches know it.
     if (s == taking_part().back() && AsksForNoiseAlone(one)) {
       diagnosis_.posterior = one.posterior;
@@ -271,52 +270,13 @@ class SessionsReporter {
     return absl::OkStatus();
   }
 
-  static bool IsOfNoise(const model::Model& model, const std::string& effect) {
-    return std::any_of(model.effects.begin(), model.effects.end(),
-                       [&](const model::EffectInstance& instance) {
-                         return instance.effect->random() && engine::NameOf(*instance.effect) == effect;
-                       });
-  }
-  // Whether all that a session asks for beside the effects of all sessions is another noise.
-  static bool AsksForNoiseAlone(const report::Diagnosis& one) {
-    if (!one.improved_model) return one.steps.empty() && one.refitted.empty();
-    const auto noise = [&](const auto& named) { return IsOfNoise(*one.improved_model, named.effect); };
-    return std::all_of(one.steps.begin(), one.steps.end(), noise) &&
-           std::all_of(one.refitted.begin(), one.refitted.end(), noise);
-  }
-  // Noise is a session's own. Another effect is no step: the sessions do not agree on it.
-  static Verdict VerdictOfRest(const report::Diagnosis& one) {
-    const bool still = one.verdict == Verdict::kMissingEffects || one.verdict == Verdict::kWrongValues;
-    return still && !AsksForNoiseAlone(one) ? Verdict::kUnexplained : one.verdict;
-  }
-  void AddRest(const report::Diagnosis& one, int session, int place) {
-    if (!AsksForNoiseAlone(one)) {
-      for (const report::Step& step : one.steps) still_.push_back({session, step.effect});
-      return;
-    }
-    if (!one.improved_model) return;
-    model::Model& own = diagnosis_.sessions->changes->models[place];
-    const std::string name = own.name;
-    own = *one.improved_model;
-    own.name = name;
-    noise_moved_ = true;
-    for (const report::Step& step : one.steps) {
-      const auto same = std::find_if(noise_steps_.begin(), noise_steps_.end(),
-                                     [&](const report::Step& other) { return other.effect == step.effect; });
-      if (same == noise_steps_.end())
-        noise_steps_.push_back(step);
-      else
-        *same = step;  // the last session's
-    }
-  }
-
   void AddSteps() {
     for (const joint::SessionStep& found : changes().steps) {
       report::Step step = report::StepOfSessions(found, changes(), Name(taking_part().back()));
       engine::AddConfounded(step, &diagnosis_.confounded);
       diagnosis_.steps.push_back(std::move(step));
     }
-    for (report::Step& step : noise_steps_) {
+    for (report::Step step : rests_.noise_steps()) {
       step.model = changes().models.back();
       diagnosis_.steps.push_back(std::move(step));
       // Noise moves no error.
@@ -326,7 +286,7 @@ class SessionsReporter {
       }
     }
     diagnosis_.refitted = changes().refitted;
-    if (!changes().moved() && !noise_moved_) return;
+    if (!changes().moved() && !rests_.changed_noise()) return;
     diagnosis_.improved_model = changes().models.back();
     diagnosis_.improved_model->name = given().name.empty() ? "" : given().name + "_better";
   }
@@ -374,8 +334,8 @@ class SessionsReporter {
   }
 
   void Summarize() {
-    diagnosis_.sessions->words = report::SessionsInWords(*diagnosis_.sessions, diagnosis_.data, unexplained_);
-    diagnosis_.summary = report::SummarizeSessions(diagnosis_, still_);
+    diagnosis_.sessions->words = report::SessionsInWords(*diagnosis_.sessions, diagnosis_.data, rests_.unexplained());
+    diagnosis_.summary = report::SummarizeSessions(diagnosis_, rests_.asked_by_one());
   }
 
   const std::vector<DiagnosisInput>& sessions_;
@@ -384,10 +344,7 @@ class SessionsReporter {
   std::vector<report::Diagnosis> alone_;                               // of every session by itself
   std::vector<std::unique_ptr<selection::TouchModality>> modalities_;  // of those that take part
   joint::ClaimedEffects claimed_;                                      // likewise
-  std::vector<int> unexplained_;           // sessions with a rest under their own models
-  bool noise_moved_ = false;               // a session has another noise than the given model
-  std::vector<report::Step> noise_steps_;  // kinds of noise that a session shows
-  std::vector<report::AskedByOne> still_;
+  SessionRests rests_;
   int last_session_ = 0;  // whose touches the posterior is of
 };
 
