@@ -334,7 +334,8 @@ class SessionsReporter {
   }
 
   void Summarize() {
-    diagnosis_.sessions->words = report::SessionsInWords(*diagnosis_.sessions, diagnosis_.data, rests_.unexplained());
+    diagnosis_.sessions->words =
+        report::SessionsInWords(*diagnosis_.sessions, diagnosis_.data, rests_.unexplained());
     diagnosis_.summary = report::SummarizeSessions(diagnosis_, rests_.asked_by_one());
   }
 
