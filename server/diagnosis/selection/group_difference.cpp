@@ -91,12 +91,15 @@ class DifferenceSearch {
     return 0.5 * repeats_.degrees() * std::log(before / after) - 0.5 * values * std::log(repeats_.degrees());
   }
 
-  // Of what repeats differ by under the given model, what a fit takes off; only values that change it are paid for.
+  // Of what repeats differ by under the given model, what a fit takes off. A value is paid for by the share of its column that
+  // differs within poses: the degrees of freedom that it takes there. What is the same in every touch of a pose fixes the rest
+  // of it; beside an effect of the touch before, every value of a pose differs a little within poses.
   double NatsOf(const engine::Fit& fit) const {
     const Eigen::MatrixXd centred = repeats_.Centred(fit.columns.values);
-    int values = 0;
+    double values = 0;
     for (Eigen::Index i = 1; i < centred.cols(); ++i)
-      values += centred.col(i).squaredNorm() > kVisible * fit.columns.values.col(i).squaredNorm();
+      if (const double whole = fit.columns.values.col(i).squaredNorm(); whole > 0)
+        values += centred.col(i).squaredNorm() / whole;
     return Nats(repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm(),
                 std::max(centred.col(0).squaredNorm(), kMinSumOfSquares), values);
   }
