@@ -220,7 +220,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   TOUCHSTONE_ASSIGN_OR_RETURN(const selection::Ladder ladder, selection::BuildLadder(*workspace, &selection));
   if (ladder.set_aside.is_finding) {
     std::vector<int> rows;
-    for (const int k : o.outliers) rows.push_back(o.row[k]);
+    for (const int k : touches::LeftOutFor(o, touches::kOutlierReason)) rows.push_back(o.row[k]);
     const std::vector<engine::DataProblem> of_rows = checks::FindProblemsOfRows(input, rows, context.pool);
     if (!of_rows.empty()) return check_data(of_rows);
   }

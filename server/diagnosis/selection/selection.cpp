@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/effect_columns.h"
@@ -11,6 +10,7 @@
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/group_difference.h"
+#include "server/diagnosis/selection/revised_touches.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
@@ -175,56 +175,6 @@ absl::StatusOr<touches::NoiseFindings> NoiseOf(const Workspace& workspace, const
   if (o.unused.count(touches::kOutlierReason) > 0) declared.degrees_of_freedom.reset();
   return touches::FindNoise(touches::MakeNoiseSample(o, residuals, details), fit.model.size() + surface_dof,
                             declared);
-}
-
-// Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
-// count less. Returns whether anything changed; `weights`: by row of the set.
-absl::StatusOr<bool> ReviseTouches(const engine::Fit& fit, const touches::NoiseFindings& noise,
-                                   const std::vector<int>& outliers, Workspace* workspace,
-                                   std::vector<double>* weights) {
-  touches::Observations& o = *workspace->observations;
-  TOUCHSTONE_ASSIGN_OR_RETURN(const int edges, LeaveOutEdges(*workspace->predictor, fit.model.base(), &o));
-  const bool reweigh = weights->empty() && !noise.weights.empty();
-  if (edges == 0 && outliers.empty() && !reweigh) return false;
-  for (const int k : outliers) touches::LeaveOut(&o, k, touches::kOutlierReason);
-  weights->clear();
-  if (noise.weights.empty()) return true;
-  weights->assign(o.set->size(), 1.0);
-  for (int k = 0; k < o.size(); ++k) (*weights)[o.row[k]] = noise.weights[k];
-  return true;
-}
-
-// A few touches that are so far from the given model that beside them nothing else would show.
-void LeaveOutWild(Workspace* workspace) {
-  constexpr double kWild = 100;  // robust standard deviations
-  constexpr double kFewShare = 0.005;
-  constexpr double kSigmaOverMedian = 1.4826;
-  touches::Observations& o = *workspace->observations;
-  const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
-  std::vector<double> largest(o.size(), 0), used;
-  for (int k = 0; k < o.size(); ++k) {
-    if (!o.used[k]) continue;
-    for (int i = 0; i < o.fingers; ++i)
-      if (const double r = std::abs(residuals[static_cast<size_t>(k) * o.fingers + i]); !std::isnan(r))
-        largest[k] = std::max(largest[k], r);
-    used.push_back(largest[k]);
-  }
-  if (used.empty()) return;
-  std::nth_element(used.begin(), used.begin() + static_cast<long>(used.size() / 2), used.end());
-  const double bound = kWild * kSigmaOverMedian * used[used.size() / 2];
-  std::vector<int> wild;
-  for (int k = 0; k < o.size(); ++k)
-    if (o.used[k] && bound > 0 && largest[k] > bound) wild.push_back(k);
-  if (static_cast<double>(wild.size()) > std::max(1.0, kFewShare * static_cast<double>(used.size()))) return;
-  for (const int k : wild) touches::LeaveOut(&o, k, touches::kOutlierReason);
-}
-
-// What a part of the session has for itself says nothing of the rest.
-void LeaveOutRows(const GroupDifference& group, touches::Observations* o) {
-  std::vector<char> leaves(o->set->size(), 0);
-  for (const int row : group.rows) leaves[row] = 1;
-  for (int k = 0; k < o->size(); ++k)
-    if (leaves[o->row[k]]) touches::LeaveOut(o, k, absl::StrCat(group.part, ", where something was other"));
 }
 
 }  // namespace

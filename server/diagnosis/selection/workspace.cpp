@@ -121,8 +121,7 @@ void LeaveOutMissed(const touches::Prediction& prediction, touches::Observations
     int members = 0;
     for (size_t e = static_cast<size_t>(k) * o->fingers; e < static_cast<size_t>(k + 1) * o->fingers; ++e)
       members += !std::isnan(o->time_s[e]) && !std::isnan(prediction.time_s[e]);
-    if (members < 2)
-      touches::LeaveOut(o, k, "in the model fewer than two of the reporting fingers meet the object");
+    if (members < 2) touches::LeaveOut(o, k, touches::kMissedReason);
   }
 }
 
@@ -146,7 +145,7 @@ absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const mod
       }
     }
     if (!edge) continue;
-    touches::LeaveOut(o, k, "a finger meets the object within 0.3 mm of an edge that another would pass");
+    touches::LeaveOut(o, k, touches::kEdgeReason);
     ++left_out;
   }
   return left_out;

@@ -9,6 +9,7 @@ namespace touchstone::diagnosis::touches {
 namespace {
 
 constexpr size_t kMaxSpeeds = 20;
+constexpr size_t kMaxExamples = 5;
 
 }  // namespace
 
@@ -18,9 +19,13 @@ DataSummary SummarizeData(const Observations& o) {
   data.origin = set.origin;
   data.fingers = o.fingers;
   data.rows = set.size();
-  data.unused = o.unused;
-  const auto outliers = o.unused.find(kOutlierReason);
-  if (outliers != o.unused.end()) data.outliers = outliers->second.count;
+  for (const auto& [reason, touches] : o.unused) {
+    UnusedTouches& unused = data.unused[reason];
+    unused.count = static_cast<int>(touches.size());
+    for (size_t i = 0; i < touches.size() && i < kMaxExamples; ++i)
+      unused.examples.push_back(set.touch[o.row[touches[i]]]);
+  }
+  data.outliers = static_cast<int>(LeftOutFor(o, kOutlierReason).size());
   data.objects = o.objects;
   std::set<int> poses, rounds;
   std::set<double> speeds_mm_s;

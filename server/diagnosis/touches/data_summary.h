@@ -9,6 +9,12 @@
 
 namespace touchstone::diagnosis::touches {
 
+// Touches that were left out for one reason.
+struct UnusedTouches {
+  int count = 0;
+  std::vector<uint64_t> examples;  // the first few, by touch number
+};
+
 struct DataSummary {
   std::string origin;  // what messages call the set: the path
   int fingers = 0;

@@ -14,7 +14,6 @@
 namespace touchstone::diagnosis::touches {
 namespace {
 
-constexpr size_t kMaxExamples = 5;
 // More backward steps of the session time than this share: the file is not in the order of the session.
 constexpr double kMaxBackward = 0.05;
 
@@ -146,11 +145,23 @@ std::vector<int> RoundsOfTouches(const Observations& o) {
 void LeaveOut(Observations* observations, int k, const std::string& reason) {
   if (!observations->used[k]) return;
   observations->used[k] = 0;
-  UnusedTouches& unused = observations->unused[reason];
-  ++unused.count;
-  if (reason == kOutlierReason) observations->outliers.push_back(k);
-  if (unused.examples.size() < kMaxExamples)
-    unused.examples.push_back(observations->set->touch[observations->row[k]]);
+  observations->unused[reason].push_back(k);
+}
+
+std::vector<int> LeftOutFor(const Observations& observations, const std::string& reason) {
+  const auto found = observations.unused.find(reason);
+  return found == observations.unused.end() ? std::vector<int>() : found->second;
+}
+
+void TakeBack(Observations* observations, int k, const std::string& reason) {
+  const auto found = observations->unused.find(reason);
+  if (found == observations->unused.end()) return;
+  std::vector<int>& touches = found->second;
+  const auto place = std::find(touches.begin(), touches.end(), k);
+  if (place == touches.end()) return;
+  touches.erase(place);
+  observations->used[k] = 1;
+  if (touches.empty()) observations->unused.erase(found);
 }
 
 double PauseS(const Observations& o, int k) {

@@ -12,12 +12,6 @@
 
 namespace touchstone::diagnosis::touches {
 
-// Touches that were left out for one reason.
-struct UnusedTouches {
-  int count = 0;
-  std::vector<uint64_t> examples;  // the first few, by touch number
-};
-
 // Touches k = 0 .. size()-1 in the order of the session (session time if there is one, else the file's
 // order).
 struct Observations {
@@ -32,8 +26,7 @@ struct Observations {
   std::vector<double> time_s;  // [k * fingers + finger], NaN: not reported
   std::vector<char> used;      // 0: left out of every fit and error (edge contacts, outliers, ...)
   std::vector<int> previous;   // the session's previous touch; -1: none
-  std::map<std::string, UnusedTouches> unused;  // by reason
-  std::vector<int> outliers;                    // touches k that were left out for kOutlierReason
+  std::map<std::string, std::vector<int>> unused;  // touches k by the reason why they are left out
 
   int size() const { return static_cast<int>(row.size()); }
 };
@@ -47,6 +40,12 @@ double PauseS(const Observations& observations, int k);
 // The round of each touch: as the set numbers it, else how often its pose came before. [k]
 std::vector<int> RoundsOfTouches(const Observations& observations);
 
+// The reason of touches that miss the object, or all but miss an edge of it, in the model at hand.
+inline constexpr char kMissedReason[] =
+    "in the model fewer than two of the reporting fingers meet the object";
+inline constexpr char kEdgeReason[] =
+    "a finger meets the object within 0.3 mm of an edge that another would pass";
+
 // The reason of touches with a finger whose time no noise explains.
 inline constexpr char kOutlierReason[] =
     "an outlier: one finger's time is far from what all other touches allow";
@@ -57,5 +56,11 @@ inline constexpr char kImpossibleReason[] =
 
 // Takes touch k out, with the reason in words for people ("a finger within 0.3 mm of an edge").
 void LeaveOut(Observations* observations, int k, const std::string& reason);
+
+// Touches that were left out for the reason.
+std::vector<int> LeftOutFor(const Observations& observations, const std::string& reason);
+
+// Takes touch k, which was left out for the reason, in again.
+void TakeBack(Observations* observations, int k, const std::string& reason);
 
 }  // namespace touchstone::diagnosis::touches

@@ -34,7 +34,7 @@ int FaceOf(const Eigen::Vector3d& approach) {
 engine::SetAside AssessTouchesSetAside(const touches::Observations& o, const std::vector<double>& residuals,
                                        double rmse_s, double noise_s) {
   std::vector<char> outlier(o.size(), 0), aside;
-  for (const int k : o.outliers) outlier[k] = 1;
+  for (const int k : touches::LeftOutFor(o, touches::kOutlierReason)) outlier[k] = 1;
   Division objects, rounds,
       faces{{"of touches along +x", "of touches along -x", "of touches along +y", "of touches along -y",
              "of touches along +z", "of touches along -z"},
