@@ -37,8 +37,6 @@ absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const Dia
   diagnosis.noise_floor = NoiseFloorOfPhotographs(photographs, expectation->before, context.pool);
   diagnosis.initial = QualityOfPhotographs(photographs, expectation->before, 0, context.pool);
   AssessByPixels(photographs, diagnosis.noise_floor, &*diagnosis.initial);
-  const double floor = diagnosis.noise_floor.sigma, rmse = diagnosis.initial->rmse;
-  diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
   if (!diagnosis.noise_floor.from_repeats)
     diagnosis.warnings.push_back(
         "No picture was taken twice: the noise floor is an upper bound, from what neighbouring pixels differ "

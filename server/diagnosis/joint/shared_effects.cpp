@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/ladder/hypotheses.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/joint/shared_search.h"
 
@@ -22,6 +23,22 @@ constexpr double kUnknown = 10;      // usual sizes: a value that is known no be
 bool HasName(const std::vector<SharedEffect>& effects, const std::string& name) {
   return std::any_of(effects.begin(), effects.end(),
                      [&](const SharedEffect& effect) { return effect.name() == name; });
+}
+
+// What several kinds together may show beside effects that each names by itself, in the order in which it is asked.
+struct JointHypothesis {
+  enum { kConflict, kUndecided, kSharedCause };
+};
+const std::vector<engine::HypothesisRule>& JointHypothesisRules() {
+  using J = JointHypothesis;
+  using L = engine::Leaves;
+  static const auto& rules = *new std::vector<engine::HypothesisRule>{
+      // Where one kind wants another value than another, nothing is averaged.
+      {J::kConflict, "conflict", L::kMeans, {J::kSharedCause}},
+      {J::kUndecided, "undecided", L::kNothing, {}},
+      {J::kSharedCause, "shared cause", L::kNothing, {}},
+  };
+  return rules;
 }
 
 class SharedFinder {
@@ -47,10 +64,10 @@ class SharedFinder {
     TOUCHSTONE_RETURN_IF_ERROR(Enter(0));
     TOUCHSTONE_ASSIGN_OR_RETURN(const SharedSelection selection, SearchShared(sides_));
     TOUCHSTONE_RETURN_IF_ERROR(Enter(0.7));
-    TOUCHSTONE_RETURN_IF_ERROR(FindConflicts(selection));
-    FindUndecided(selection);
-    if (found_.conflicts.empty() && !selection.best.shared.empty())
-      TOUCHSTONE_RETURN_IF_ERROR(Describe(selection));
+    using J = JointHypothesis;
+    TOUCHSTONE_RETURN_IF_ERROR(hypotheses_.Ask({{J::kConflict, [&] { return FindConflicts(selection); }},
+                                                {J::kUndecided, [&] { return FindUndecided(selection); }},
+                                                {J::kSharedCause, [&] { return Describe(selection); }}}));
     return std::move(found_);
   }
 
@@ -127,6 +144,7 @@ class SharedFinder {
     }
     const double p = engine::WaldP(difference, covariance);
     if (p > kConflictP) return;
+    hypotheses_.Add(JointHypothesis::kConflict);
     found_.conflicts.push_back({name,
                                 {a.first, b.first},
                                 {one.fit.model.Describe(one.index, one.fit.point, one.covariance),
@@ -136,7 +154,7 @@ class SharedFinder {
   }
 
   // What explains as much as the best, with a shared effect in the place of others.
-  void FindUndecided(const SharedSelection& selection) {
+  absl::Status FindUndecided(const SharedSelection& selection) {
     for (const JointExplanation& tried : selection.tried) {
       if (tried.fit.log_evidence < selection.best.fit.log_evidence - engine::SearchRules().equivalent_nats)
         continue;
@@ -149,6 +167,7 @@ class SharedFinder {
         if (!instead.empty()) found_.undecided.push_back({effect.name(), std::move(instead)});
       }
     }
+    return absl::OkStatus();
   }
   static const std::string& NameOfShared(const SharedEffect& effect) { return effect.name(); }
   static const std::string& NameOfShared(const Undecided& undecided) { return undecided.effect; }
@@ -180,6 +199,7 @@ class SharedFinder {
   }
 
   absl::Status Describe(const SharedSelection& selection) {
+    if (selection.best.shared.empty()) return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit fit, Polish(selection.best));
     std::vector<SharedEffect> in_place;
     for (const SharedEffect& shared : selection.best.shared) {
@@ -269,7 +289,7 @@ class SharedFinder {
   // How probable, which kinds show it, what else would do.
   void AssessStep(const SharedSelection& selection, const SharedEffect& shared, SharedStep* step) const {
     const double best = selection.best.fit.log_evidence;
-    std::vector<double> all, same;
+    engine::Alternatives alternatives;
     double without = selection.none.fit.log_evidence;
     const auto has = [](const JointExplanation& explained, const std::string& name) {
       return std::any_of(explained.shared.begin(), explained.shared.end(),
@@ -277,14 +297,12 @@ class SharedFinder {
     };
     const auto consider = [&](const JointExplanation& explained) {
       const double evidence = explained.fit.log_evidence;
-      all.push_back(evidence);
-      if (has(explained, shared.name())) {
-        same.push_back(evidence);
-        return;
-      }
+      const bool is_same = has(explained, shared.name());
+      const bool equivalent = !is_same && evidence >= best - engine::SearchRules().equivalent_nats;
+      alternatives.Add(evidence, is_same || equivalent);
+      if (is_same) return;
       without = std::max(without, evidence);
-      if (evidence < best - engine::SearchRules().equivalent_nats) return;
-      same.push_back(evidence);
+      if (!equivalent) return;
       for (const SharedEffect& other : explained.shared)
         if (!has(selection.best, other.name())) step->equivalent.push_back(other.name());
       for (const std::string& own : OwnBeside(explained, selection.best)) step->equivalent.push_back(own);
@@ -295,7 +313,7 @@ class SharedFinder {
     step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()),
                            step->equivalent.end());
     step->gain_nats = best - without;
-    step->probability = engine::ProbabilityOfShare(engine::LogSum(same) - engine::LogSum(all));
+    step->probability = alternatives.Probability();
     std::vector<std::string> shown_by;
     for (const Side& side : sides_)
       if (ShownBy(side.kind, shared.name(), selection.best.fit)) shown_by.push_back(side.modality->name());
@@ -326,6 +344,7 @@ class SharedFinder {
   const std::function<bool(double)>& progress_;
   Sides sides_;
   SharedEffects found_;
+  engine::Hypotheses hypotheses_{JointHypothesisRules()};
 };
 
 }  // namespace

@@ -175,11 +175,11 @@ std::string SummarizeJointly(const JointParts& parts) {
 
 // A conflict is worse than what a named effect explains.
 Verdict VerdictOf(const JointParts& parts) {
-  Verdict verdict = WorseOf(parts.touches.verdict, parts.photographs.verdict);
-  if (!parts.shared.conflicts.empty()) return WorseOf(verdict, Verdict::kUnexplained);
-  for (const joint::SharedStep& step : parts.shared.steps)
-    verdict = WorseOf(verdict, step.given ? Verdict::kWrongValues : Verdict::kMissingEffects);
-  return verdict;
+  const Verdict verdict = WorseOf(parts.touches.verdict, parts.photographs.verdict);
+  const auto& steps = parts.shared.steps;
+  const auto given = std::count_if(steps.begin(), steps.end(), [](const auto& step) { return step.given; });
+  return WorseOf(verdict, engine::VerdictOf(!parts.shared.conflicts.empty(),
+                                            given<static_cast<long>(steps.size()), given> 0));
 }
 
 }  // namespace

@@ -86,24 +86,24 @@ absl::StatusOr<SelectedStep> AssessStep(const StepwiseSearch& search, const Expl
   const std::string own_object = fit.model.OnlyObject(index);
   const Equivalence equivalence(search, whole, index, step.gain_nats);
   // Log evidence over the step's own: that nothing takes its place, what else could, what is equivalent.
-  std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
+  Alternatives alternatives;
+  alternatives.Add(-step.gain_nats, false);
   for (const CompetingFit& other : competing) {
     CompetingEffect found = {
         other.name, other.per_object, other.object, other.fit.log_evidence - fit.log_evidence, false, false,
         {}};
     equivalence.Assess(other, &found);
     const bool same = other.name == own && other.object == own_object;
-    all.push_back(found.relative_log_evidence);
-    if (same || found.equivalent) same_or_equivalent.push_back(found.relative_log_evidence);
+    alternatives.Add(found.relative_log_evidence, same || found.equivalent);
     if (same || other.nameless) continue;
     found.model = other.fit.model.base();
     step.competing.push_back(std::move(found));
   }
   if (const auto rival = rivals.find(own); rival != rivals.end()) {
-    all.push_back(rival->second.ahead_nats);
+    alternatives.Add(rival->second.ahead_nats, false);
     if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
   }
-  step.probability = ProbabilityOfShare(LogSum(same_or_equivalent) - LogSum(all));
+  step.probability = alternatives.Probability();
   return step;
 }
 
@@ -167,6 +167,15 @@ bool ChangesNothing(const Fit& fit, int index) {
 
 double ProbabilityOfShare(double log_share) {
   return std::min(kMaxProbability, std::exp(log_share));
+}
+
+void Alternatives::Add(double log_evidence, bool same) {
+  all_.push_back(log_evidence);
+  if (same) same_.push_back(log_evidence);
+}
+
+double Alternatives::Probability() const {
+  return ProbabilityOfShare(LogSum(same_) - LogSum(all_));
 }
 
 double ProbabilityOf(double log_odds) {

@@ -18,24 +18,14 @@ namespace {
 
 constexpr double kLargeShare = 0.6;   // of the excess on unseen pictures, that a step beside a rest takes
 constexpr double kLargeMisfit = 1.2;  // of the noise, from where such steps are looked for
-constexpr double kNearChoice = 0.1;   // of a choice, that a fitted mean of two is it
 constexpr int kMaxLargeSteps = 3, kMaxLargeTried = 4;
-
-model::Model NamedPartOf(const model::Model& model) {
-  model::Model named = model;
-  named.effects.erase(
-      std::remove_if(named.effects.begin(), named.effects.end(),
-                     [](const auto& instance) { return instance.effect->name == kImageFieldName; }),
-      named.effects.end());
-  return named;
-}
 
 // Root mean square over all pixels of all photographs.
 absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Model& model, ThreadPool* pool) {
   std::vector<int> all(photographs.size());
   std::iota(all.begin(), all.end(), 0);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> squares,
-                              SquaredErrors(photographs, NamedPartOf(model), all, pool));
+                              SquaredErrors(photographs, WithoutImageField(model), all, pool));
   const double pixels =
       static_cast<double>(photographs.width()) * photographs.height() * std::max(photographs.size(), 1);
   return std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) / pixels);
@@ -45,7 +35,7 @@ absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Mode
 absl::StatusOr<double> NoiseOfPixels(const Photographs& photographs, const model::Model& model,
                                      ThreadPool* pool) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
-                              ExpectPhotographs(photographs, NamedPartOf(model), false, pool));
+                              ExpectPhotographs(photographs, WithoutImageField(model), false, pool));
   double variance = 0, pixels = 0;
   for (const image::Photo& photo : expected) {
     for (const float grey : photo.grey) variance += photographs.record->Variance(grey);
@@ -75,8 +65,7 @@ class LargeSteps {
     const engine::StepwiseSearch search(experiment, NamedOfRig(fine.search->candidates()),
                                         fine.search->rules(), quiet);
     engine::Parameterization named = selection_.fit.model;
-    for (int e = static_cast<int>(named.base().effects.size()) - 1; e >= 0; --e)
-      if (named.base().effects[e].effect->name == kImageFieldName) named = named.Without(e);
+    if (const int field = IndexOfImageField(named.base()); field >= 0) named = named.Without(field);
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(experiment, named));
     bool any = false;
     for (int step = 0; step < kMaxLargeSteps && left >= kLargeMisfit * noise; ++step) {
@@ -97,6 +86,7 @@ class LargeSteps {
         *fine.experiment, NamedOfRig(fine.search->candidates()), fine.search->rules(), quiet);
     TOUCHSTONE_ASSIGN_OR_RETURN(selection_.initial,
                                 engine::FitModel(*fine.experiment, selection_.initial.model));
+    selection_.found.Add(PhotoHypothesis::kLargeStep);
     selection_.fit = std::move(fit);
     selection_.covariance = CovarianceBetweenBlocks(*fine.experiment, selection_.fit);
     return absl::OkStatus();
@@ -198,31 +188,6 @@ class Rungs {
 absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContext& context,
                            PhotoSelection* selection) {
   return LargeSteps(photographs, context, selection).Run();
-}
-
-absl::Status HoldChoices(PhotoSelection* selection) {
-  for (int e = static_cast<int>(selection->fit.model.base().effects.size()) - 1; e >= 0; --e) {
-    const model::EffectInstance& instance = selection->fit.model.base().effects[e];
-    if (!selection->fit.model.IsFree(e) || instance.effect->parameters.empty() ||
-        instance.effect->parameters[0].choices.empty())
-      continue;
-    engine::Parameterization held = selection->fit.model;
-    Eigen::VectorXd point = held.Start();
-    bool is_choice = true;
-    for (int i = 0; i < held.size(); ++i) {
-      if (held.parameters()[i].effect != e) continue;
-      const double choice = std::round(point[i]);
-      is_choice &= std::abs(point[i] - choice) < kNearChoice && choice != held.parameters()[i].neutral;
-      point[i] = choice;
-    }
-    held.MoveTo(point);
-    if (is_choice || e < selection->initial_effects)
-      held.Hold(e);
-    else
-      held = held.Without(e);
-    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, engine::FitModel(*selection->fine.experiment, held));
-  }
-  return absl::OkStatus();
 }
 
 absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,
