@@ -15,7 +15,6 @@
 #include "server/diagnosis/boards/board_search.h"
 #include "server/diagnosis/engine/fit/fitted_values.h"
 #include "server/diagnosis/engine/fit/resampled_covariance.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {

@@ -15,7 +15,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_set.h"
-#include "server/diagnosis/engine/ladder/improvement.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/uncertainty/budget.h"

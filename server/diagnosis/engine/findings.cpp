@@ -2,7 +2,6 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/competition/candidate_ranking.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
 
 namespace touchstone::diagnosis::engine {

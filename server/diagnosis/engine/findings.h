@@ -1,5 +1,5 @@
 // What one kind of measurement by itself is found to lack, from its rows alone: the whole way from an explanation to a
-// verdict. Kinds with hypotheses, noise or words of their own build on its parts (ladder/improvement.h).
+// verdict. Kinds with hypotheses, noise or words of their own build on its parts (ladder/ladder.h).
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "server/diagnosis/engine/ladder/improvement.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/modality.h"
 
 namespace touchstone::diagnosis::engine {

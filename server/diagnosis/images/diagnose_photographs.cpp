@@ -15,18 +15,13 @@ double SecondsNow() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-absl::Status Enter(const DiagnosisContext& context, const char* stage, double done) {
-  if (!context.progress || context.progress(stage, done)) return absl::OkStatus();
-  return absl::CancelledError("the diagnosis was cancelled");
-}
-
 // What every answer begins with: how wrong the given model is.
 absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const DiagnosisContext& context,
                                           Expectation* expectation) {
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "reading", 0));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("reading", 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(expectation->photographs, MakePhotographs(input, context.pool));
   const Photographs& photographs = expectation->photographs;
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "predicting", 0.02));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("predicting", 0.02));
   TOUCHSTONE_ASSIGN_OR_RETURN(expectation->before,
                               ExpectPhotographs(photographs, *input.model, true, context.pool));
   PhotographDiagnosis diagnosis;
@@ -69,16 +64,16 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
     diagnosis.verdict = engine::Verdict::kTooLittleData;
     diagnosis.images_needed = kMinPoses;
   } else {
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));
+    TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.1));
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
                                 SelectPhotoExplanation(input, expectation->photographs, context));
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
+    TOUCHSTONE_RETURN_IF_ERROR(context.Enter("describing", 0.85));
     expectation->left = FindExplanationsLeft(selection);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,
                                                    expectation->before, &diagnosis, &expectation->after));
   }
   diagnosis.duration_s = SecondsNow() - began;
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "done", 1));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("done", 1));
   return diagnosis;
 }
 

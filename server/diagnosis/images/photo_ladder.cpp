@@ -8,7 +8,6 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/competition/candidate_ranking.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_budget.h"
 #include "server/diagnosis/images/photo_hypotheses.h"
 #include "server/diagnosis/images/pixels/image_field.h"
@@ -155,23 +154,23 @@ class PhotoLadder {
     const std::vector<KindOfRest> kinds = KindsOfRest(judged, expected, pool_);
     engine::UnexplainedRest rest;
     TOUCHSTONE_RETURN_IF_ERROR(found_.Ask(
-        {{P::kMisfit, [&] { return AskIf(HasMisfit(), P::kMisfit); }},
+        {{P::kMisfit, [&] { return found_.AddIf(HasMisfit(), P::kMisfit); }},
          {P::kAlbedo,
           [&] {
-            return AskIf(fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats &&
-                             ShareOf(RestKind::kOnObjects, kinds) > 0,
-                         P::kAlbedo);
+            return found_.AddIf(fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats &&
+                                    ShareOf(RestKind::kOnObjects, kinds) > 0,
+                                P::kAlbedo);
           }},
          {P::kDependence, [&] { return AskDependence(TestCovariates(judged, expected)); }},
-         {P::kImageField, [&] { return AskIf(selection_.field >= 0, P::kImageField); }},
+         {P::kImageField, [&] { return found_.AddIf(selection_.field >= 0, P::kImageField); }},
          {P::kSuggestion, [&] { return AskSuggestion(&rest); }},
          {P::kKindOfRest,
           [&] {
             const bool said = IsOfMeans() && !kinds.empty() && kinds[0].share > rest.heldout_gain;
-            return AskIf(said, P::kKindOfRest, said ? kinds[0].words : "");
+            return found_.AddIf(said, P::kKindOfRest, said ? kinds[0].words : "");
           }},
          {P::kUnevenNoise, [&] { return AskUnevenNoise(FindUnevenNoise(judged, expected, pool_)); }},
-         {P::kUnknown, [&] { return AskIf(IsOfMeans(), P::kUnknown, kUnknownInWords); }}}));
+         {P::kUnknown, [&] { return found_.AddIf(IsOfMeans(), P::kUnknown, kUnknownInWords); }}}));
     if (!found_.Leave(engine::Leaves::kBeside)) return absl::OkStatus();
     found_.DescribeRest(&rest);
     d_.unexplained = std::move(rest);
@@ -179,12 +178,6 @@ class PhotoLadder {
   }
 
   bool IsOfMeans() const { return found_.Leave(engine::Leaves::kMeans); }
-
-  absl::Status AskIf(bool is_so, int hypothesis, const std::string& words = "",
-                     engine::Hypotheses::Describe describe = nullptr) {
-    if (is_so) found_.Add(hypothesis, words, std::move(describe));
-    return absl::OkStatus();
-  }
 
   bool HasMisfit() {
     const engine::Likelihood& likelihood = *selection_.fine.likelihood;
@@ -200,8 +193,8 @@ class PhotoLadder {
     std::vector<engine::CovariateTest> tests;
     for (const PhotoCovariate& c : covariates)
       if (c.p < kRestP && c.unseen_gain > kCurveGain) tests.push_back({c.name, c.p, c.gain_nats});
-    return AskIf(!tests.empty(), P::kDependence, "",
-                 [tests](engine::UnexplainedRest* rest) { rest->covariates = tests; });
+    return found_.AddIf(!tests.empty(), P::kDependence, "",
+                        [tests](engine::UnexplainedRest* rest) { rest->covariates = tests; });
   }
 
   // A formula or a curve that says what is left of the means, with the errors that it leaves.
@@ -214,14 +207,8 @@ class PhotoLadder {
         SuggestForRest(photographs_, *selection_.photographs, d_.improved,
                        {rest->rmse, rest->heldout_rmse, d_.noise_floor.sigma}, pool_));
     if (!found) return absl::OkStatus();
-    rest->model_with = found->with;
-    rest->formula = found->formula;
-    rest->formula_yaml = found->formula_yaml;
-    rest->lookup_yaml = found->lookup_yaml;
-    rest->rmse = found->rmse_grey;
-    rest->heldout_rmse = found->heldout_rmse_grey;
-    rest->heldout_gain = found->heldout_gain;
-    return AskIf(true, P::kSuggestion, "", [first = found->covariate](engine::UnexplainedRest* of) {
+    *rest = *found;
+    return found_.AddIf(true, P::kSuggestion, "", [first = found->covariate](engine::UnexplainedRest* of) {
       std::stable_partition(of->covariates.begin(), of->covariates.end(),
                             [&](const auto& test) { return test.name == first; });
     });
@@ -229,8 +216,9 @@ class PhotoLadder {
 
   absl::Status AskUnevenNoise(const std::optional<UnevenNoise>& uneven) {
     if (!uneven) return absl::OkStatus();
-    return AskIf(true, P::kUnevenNoise, uneven->words,
-                 [test = uneven->test](engine::UnexplainedRest* rest) { rest->covariates.push_back(test); });
+    return found_.AddIf(
+        true, P::kUnevenNoise, uneven->words,
+        [test = uneven->test](engine::UnexplainedRest* rest) { rest->covariates.push_back(test); });
   }
 
   const DiagnosisInput& input_;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_ladder.h"
 #include "server/effects/all_effects.h"
 

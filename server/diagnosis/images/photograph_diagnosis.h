@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/ladder/improvement.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"

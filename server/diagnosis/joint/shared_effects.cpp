@@ -289,7 +289,7 @@ class SharedFinder {
   // How probable, which kinds show it, what else would do.
   void AssessStep(const SharedSelection& selection, const SharedEffect& shared, SharedStep* step) const {
     const double best = selection.best.fit.log_evidence;
-    engine::Alternatives alternatives;
+    std::vector<double> all, same;
     double without = selection.none.fit.log_evidence;
     const auto has = [](const JointExplanation& explained, const std::string& name) {
       return std::any_of(explained.shared.begin(), explained.shared.end(),
@@ -297,12 +297,14 @@ class SharedFinder {
     };
     const auto consider = [&](const JointExplanation& explained) {
       const double evidence = explained.fit.log_evidence;
-      const bool is_same = has(explained, shared.name());
-      const bool equivalent = !is_same && evidence >= best - engine::SearchRules().equivalent_nats;
-      alternatives.Add(evidence, is_same || equivalent);
-      if (is_same) return;
+      all.push_back(evidence);
+      if (has(explained, shared.name())) {
+        same.push_back(evidence);
+        return;
+      }
       without = std::max(without, evidence);
-      if (!equivalent) return;
+      if (evidence < best - engine::SearchRules().equivalent_nats) return;
+      same.push_back(evidence);
       for (const SharedEffect& other : explained.shared)
         if (!has(selection.best, other.name())) step->equivalent.push_back(other.name());
       for (const std::string& own : OwnBeside(explained, selection.best)) step->equivalent.push_back(own);
@@ -313,7 +315,7 @@ class SharedFinder {
     step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()),
                            step->equivalent.end());
     step->gain_nats = best - without;
-    step->probability = alternatives.Probability();
+    step->probability = engine::ProbabilityAmong(same, all);
     std::vector<std::string> shown_by;
     for (const Side& side : sides_)
       if (ShownBy(side.kind, shared.name(), selection.best.fit)) shown_by.push_back(side.modality->name());
@@ -325,18 +327,8 @@ class SharedFinder {
   // Whether one kind, with everything else in place, has a value that chance would not give it.
   static bool ShownBy(int kind, const std::string& name, const JointFit& fit) {
     const engine::Fit& own = fit.fits[kind];
-    const int index = IndexOf(own.model.base(), name);
-    std::vector<int> members;
-    for (int i = 0; i < own.model.size(); ++i)
-      if (own.model.parameters()[i].effect == index) members.push_back(i);
-    const int n = static_cast<int>(members.size());
-    Eigen::VectorXd difference(n);
-    Eigen::MatrixXd covariance(n, n);
-    for (int a = 0; a < n; ++a) {
-      difference[a] = fit.alone[kind][members[a]] - own.model.parameters()[members[a]].neutral;
-      for (int b = 0; b < n; ++b) covariance(a, b) = own.covariance(members[a], members[b]);
-    }
-    return engine::WaldP(difference, covariance) < kShownP;
+    return engine::NeutralP(own.model, IndexOf(own.model.base(), name), fit.alone[kind], own.covariance) <
+           kShownP;
   }
 
   const std::vector<const engine::Modality*>& kinds_;

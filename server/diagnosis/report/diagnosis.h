@@ -13,7 +13,7 @@
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/engine/competition/detectability.h"
 #include "server/diagnosis/engine/competition/effect_explanation.h"
-#include "server/diagnosis/engine/ladder/improvement.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/joint/session_changes.h"

@@ -86,24 +86,24 @@ absl::StatusOr<SelectedStep> AssessStep(const StepwiseSearch& search, const Expl
   const std::string own_object = fit.model.OnlyObject(index);
   const Equivalence equivalence(search, whole, index, step.gain_nats);
   // Log evidence over the step's own: that nothing takes its place, what else could, what is equivalent.
-  Alternatives alternatives;
-  alternatives.Add(-step.gain_nats, false);
+  std::vector<double> all = {-step.gain_nats}, same_or_equivalent;
   for (const CompetingFit& other : competing) {
     CompetingEffect found = {
         other.name, other.per_object, other.object, other.fit.log_evidence - fit.log_evidence, false, false,
         {}};
     equivalence.Assess(other, &found);
     const bool same = other.name == own && other.object == own_object;
-    alternatives.Add(found.relative_log_evidence, same || found.equivalent);
+    all.push_back(found.relative_log_evidence);
+    if (same || found.equivalent) same_or_equivalent.push_back(found.relative_log_evidence);
     if (same || other.nameless) continue;
     found.model = other.fit.model.base();
     step.competing.push_back(std::move(found));
   }
   if (const auto rival = rivals.find(own); rival != rivals.end()) {
-    alternatives.Add(rival->second.ahead_nats, false);
+    all.push_back(rival->second.ahead_nats);
     if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
   }
-  step.probability = alternatives.Probability();
+  step.probability = ProbabilityAmong(same_or_equivalent, all);
   return step;
 }
 
@@ -169,17 +169,27 @@ double ProbabilityOfShare(double log_share) {
   return std::min(kMaxProbability, std::exp(log_share));
 }
 
-void Alternatives::Add(double log_evidence, bool same) {
-  all_.push_back(log_evidence);
-  if (same) same_.push_back(log_evidence);
-}
-
-double Alternatives::Probability() const {
-  return ProbabilityOfShare(LogSum(same_) - LogSum(all_));
+double ProbabilityAmong(const std::vector<double>& same, const std::vector<double>& all) {
+  return ProbabilityOfShare(LogSum(same) - LogSum(all));
 }
 
 double ProbabilityOf(double log_odds) {
   return ProbabilityOfShare(-std::log1p(std::exp(-log_odds)));
+}
+
+double NeutralP(const Parameterization& model, int effect, const Eigen::VectorXd& point,
+                const Eigen::MatrixXd& covariance) {
+  std::vector<int> own;
+  for (int i = 0; i < model.size(); ++i)
+    if (model.parameters()[i].effect == effect) own.push_back(i);
+  const int n = static_cast<int>(own.size());
+  Eigen::VectorXd value(n);
+  Eigen::MatrixXd part(n, n);
+  for (int a = 0; a < n; ++a) {
+    value[a] = point[own[a]] - model.parameters()[own[a]].neutral;
+    for (int b = 0; b < n; ++b) part(a, b) = covariance(own[a], own[b]);
+  }
+  return WaldP(value, part);
 }
 
 double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance) {

@@ -73,17 +73,13 @@ double ProbabilityOfShare(double log_share);
 // The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);
 
-// All that could explain the same, one of them the explanation in question.
-class Alternatives {
- public:
-  // `same`: the one in question, or what the data cannot tell from it.
-  void Add(double log_evidence, bool same);
-  // Of those that are the same, among all.
-  double Probability() const;
+// Of the explanation in question and what the data cannot tell from it, by their log evidence among all that could explain
+// the same.
+double ProbabilityAmong(const std::vector<double>& same, const std::vector<double>& all);
 
- private:
-  std::vector<double> all_, same_;
-};
+// P of the values of an effect if it changed nothing, by WaldP.
+double NeutralP(const Parameterization& model, int effect, const Eigen::VectorXd& point,
+                const Eigen::MatrixXd& covariance);
 
 // P of values at least as far from zero as `difference` by chance, by Wald's test; values without a variance take no part.
 // 1 where nothing is known.

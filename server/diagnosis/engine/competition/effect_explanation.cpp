@@ -120,13 +120,10 @@ absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, co
   explained.parameters = fit.model.Describe(index, fit.point, fit.covariance);
   SetLimits(search.experiment(), fit, &explained.parameters);
   // That nothing is missing, each other candidate, and this one as it was fitted.
-  Alternatives alternatives;
-  alternatives.Add(0, false);
-  alternatives.Add(explained.gain_nats, true);
+  std::vector<double> all = {0, explained.gain_nats};
   for (const Extension& other : extensions)
-    if (other.visible && other.name != effect)
-      alternatives.Add(other.log_evidence - initial.log_evidence, false);
-  explained.probability = explained.changes ? alternatives.Probability() : 0;
+    if (other.visible && other.name != effect) all.push_back(other.log_evidence - initial.log_evidence);
+  explained.probability = explained.changes ? ProbabilityAmong({explained.gain_nats}, all) : 0;
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.taken_over, FindTakenOver(search, initial, extensions, explained));
   return explained;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <absl/status/status.h>
@@ -47,6 +48,11 @@ class Hypotheses {
 
   // `words`: sentences for people; may be empty. `describe`: what it knows of the rest beside.
   void Add(int hypothesis, std::string words = "", Describe describe = nullptr);
+  // The answer to a question of which only this is asked.
+  absl::Status AddIf(bool is_so, int hypothesis, std::string words = "", Describe describe = nullptr) {
+    if (is_so) Add(hypothesis, std::move(words), std::move(describe));
+    return absl::OkStatus();
+  }
   bool Has(int hypothesis) const;
   bool Allows(int hypothesis) const;
 

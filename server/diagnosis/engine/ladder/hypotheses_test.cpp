@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/engine/ladder/improvement.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {

@@ -19,6 +19,9 @@ namespace {
 constexpr double kLargeShare = 0.6;   // of the excess on unseen pictures, that a step beside a rest takes
 constexpr double kLargeMisfit = 1.2;  // of the noise, from where such steps are looked for
 constexpr int kMaxLargeSteps = 3, kMaxLargeTried = 4;
+constexpr double kStepP = 1e-4;      // of a step's values, with the scatter between pictures
+constexpr double kFaint = 0.1;       // of the noise
+constexpr double kNearChoice = 0.1;  // of a choice, that a fitted mean of two is it
 
 // Root mean square over all pixels of all photographs.
 absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Model& model, ThreadPool* pool) {
@@ -188,6 +191,61 @@ class Rungs {
 absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContext& context,
                            PhotoSelection* selection) {
   return LargeSteps(photographs, context, selection).Run();
+}
+
+absl::Status DropFaintField(PhotoSelection* selection) {
+  const int index = IndexOfImageField(selection->fit.model.base());
+  if (index < 0) return absl::OkStatus();
+  const int side = 64;  // of a coarse picture
+  const std::vector<double>& values = selection->fit.model.base().effects[index].values;
+  const Eigen::VectorXf field =
+      ImageFieldFunctions(side, side) *
+      Eigen::Map<const Eigen::VectorXd>(values.data(), kImageFieldSize).cast<float>();
+  if (field.norm() / side > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+  return absl::OkStatus();
+}
+
+absl::Status DropUnsteady(PhotoSelection* selection) {
+  for (bool dropped = true; dropped;) {
+    dropped = false;
+    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
+    for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
+         index >= selection->initial_effects && !dropped; --index) {
+      if (engine::NeutralP(selection->fit.model, index, selection->fit.point, selection->covariance) < kStepP)
+        continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+      dropped = true;
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status HoldChoices(PhotoSelection* selection) {
+  for (int e = static_cast<int>(selection->fit.model.base().effects.size()) - 1; e >= 0; --e) {
+    const model::EffectInstance& instance = selection->fit.model.base().effects[e];
+    if (!selection->fit.model.IsFree(e) || instance.effect->parameters.empty() ||
+        instance.effect->parameters[0].choices.empty())
+      continue;
+    engine::Parameterization held = selection->fit.model;
+    Eigen::VectorXd point = held.Start();
+    bool is_choice = true;
+    for (int i = 0; i < held.size(); ++i) {
+      if (held.parameters()[i].effect != e) continue;
+      const double choice = std::round(point[i]);
+      is_choice &= std::abs(point[i] - choice) < kNearChoice && choice != held.parameters()[i].neutral;
+      point[i] = choice;
+    }
+    held.MoveTo(point);
+    if (is_choice || e < selection->initial_effects)
+      held.Hold(e);
+    else
+      held = held.Without(e);
+    TOUCHSTONE_ASSIGN_OR_RETURN(selection->fit, engine::FitModel(*selection->fine.experiment, held));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,

@@ -203,31 +203,26 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
                                                       const DiagnosisContext& context) {
   const std::vector<engine::Candidate> candidates = PhotoCandidates(input, photographs);
   const engine::Parameterization base(*input.model, photographs.objects);
-  const auto enter = [&](const char* stage, double done) {
-    return !context.progress || context.progress(stage, done)
-               ? absl::OkStatus()
-               : absl::CancelledError("the diagnosis was cancelled");
-  };
   PhotoSelection selection;
   selection.initial_effects = static_cast<int>(input.model->effects.size());
-  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.2));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.2));
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation explanation,
                               ExplainCoarsely(input, photographs, candidates, context));
-  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.35));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.35));
   TOUCHSTONE_RETURN_IF_ERROR(PrepareFine(photographs, explanation.fit, candidates, context, &selection));
   selection.fine.experiment->settled = input.settled;
-  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.5));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, engine::FitModel(*selection.fine.experiment, base));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.tried, TryOnPictures(selection.fine, *input.model, input.seed));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
-  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.7));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.7));
   TOUCHSTONE_RETURN_IF_ERROR(Revise(context, &selection));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection.steps,
       engine::FindCompetitors(*selection.fine.search, {selection.fit, selection.initial_effects},
                               selection.field, {}));
-  TOUCHSTONE_RETURN_IF_ERROR(enter("fitting", 0.8));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.8));
   if (selection.field < 0 && !selection.rungs.empty()) {
     selection.heldout_ratio = selection.rungs.back().heldout_ratio;  // of the same fit
   } else {

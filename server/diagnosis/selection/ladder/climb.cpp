@@ -1,7 +1,6 @@
 #include "server/diagnosis/selection/ladder/climb.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/session/dropouts.h"

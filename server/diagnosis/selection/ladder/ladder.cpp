@@ -83,14 +83,6 @@ class LadderBuilder {
     const auto name_time = [this](engine::UnexplainedRest* rest) {
       NameTimeFirst(observations_, ladder_.noise_floor, rest);
     };
-    // What needs no more than a look at what was found before.
-    const auto if_so = [this](bool is, int hypothesis, std::string words = "",
-                              engine::Hypotheses::Describe describe = nullptr) {
-      return [=] {
-        if (is) found_.Add(hypothesis, words, describe);
-        return absl::OkStatus();
-      };
-    };
     const auto ask = [](auto question) {
       return [question] {
         question();
@@ -99,32 +91,41 @@ class LadderBuilder {
     };
     return {
         {H::kRandomWalk,
-         if_so(selection_.memory && IsRandomWalk(), H::kRandomWalk,
+         [=] {
+           return found_.AddIf(
+               selection_.memory && IsRandomWalk(), H::kRandomWalk,
                "The fingers drift through the whole session, and nothing shows that they revert to a mean: a "
                "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
                "session.",
-               name_time)},
-        {H::kCorrelatedNoise, if_so(selection_.memory.has_value(), H::kCorrelatedNoise)},
-        {H::kCourse, if_so(SharesTime(ladder_.noise_floor), H::kCourse, "", name_time)},
-        {H::kGroup,
-         if_so(selection_.group.has_value(), H::kGroup, selection_.group ? selection_.group->words : "",
-               [this](engine::UnexplainedRest* rest) {
-                 rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
-               })},
-        {H::kPartialOffset, if_so(selection_.partial.has_value(), H::kPartialOffset,
-                                  selection_.partial ? selection_.partial->words : "")},
-        {H::kFormula, if_so(selection_.formula >= 0, H::kFormula)},
-        {H::kCurve, if_so(selection_.curve.has_value(), H::kCurve,
-                          selection_.curve ? CourseInWords(selection_.curve->words) : "")},
+               name_time);
+         }},
+        {H::kCorrelatedNoise,
+         [this] { return found_.AddIf(selection_.memory.has_value(), H::kCorrelatedNoise); }},
+        {H::kCourse,
+         [=] { return found_.AddIf(SharesTime(ladder_.noise_floor), H::kCourse, "", name_time); }},
+        {H::kGroup, ask([this] {
+           if (selection_.group)
+             found_.Add(H::kGroup, selection_.group->words, [this](engine::UnexplainedRest* rest) {
+               rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
+             });
+         })},
+        {H::kPartialOffset, ask([this] {
+           if (selection_.partial) found_.Add(H::kPartialOffset, selection_.partial->words);
+         })},
+        {H::kFormula, [this] { return found_.AddIf(selection_.formula >= 0, H::kFormula); }},
+        {H::kCurve, ask([this] {
+           if (selection_.curve) found_.Add(H::kCurve, CourseInWords(selection_.curve->words));
+         })},
         {H::kStrangeValues, ask([this] { AskStrangeValues(); })},
         {H::kRemounted, ask([this] { AskRounds(); })},
         {H::kTicks, ask([this] { AskTicks(); })},
         {H::kSetAside, ask([this] { AskSetAside(); })},
         {H::kUnplaced, [this] { return AskSurface(); }},
         {H::kPlay, ask([this] { noise_.AskPlay(); })},
-        {H::kMisfit, ask([this] {
-           if (engine::StructureRemains(left_, ladder_.noise_floor.sigma)) found_.Add(H::kMisfit);
-         })},
+        {H::kMisfit,
+         [this] {
+           return found_.AddIf(engine::StructureRemains(left_, ladder_.noise_floor.sigma), H::kMisfit);
+         }},
         {H::kUnevenScatter, ask([this] { noise_.AskUnevenScatter(); })},
         {H::kRandomDelay, ask([this] { noise_.AskRandomDelay(); })},
         {H::kLopsided, ask([this] { noise_.AskLopsided(); })},

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/ladder/improvement.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/search/set_aside.h"
 #include "server/diagnosis/selection/quality.h"
