@@ -80,11 +80,7 @@ Step SharedStepOf(const joint::SharedStep& from) {
   step.words = from.words;
   if (step.shown_by.size() == 1)
     absl::StrAppend(&step.words, step.words.empty() ? "" : "; ", "only the ", from.shown_by, " show it");
-  if (const auto effect = effects::Catalogue().Find(from.effect)) {
-    step.meaning = effect->meaning;
-    step.check_on_rig = effect->check_on_rig;
-    step.remedy = effect->remedy;
-  }
+  if (const auto effect = effects::Catalogue().Find(from.effect)) engine::AddTexts(*effect, &step);
   return step;
 }
 

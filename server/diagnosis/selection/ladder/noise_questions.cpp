@@ -37,8 +37,10 @@ void NoiseQuestions::AskPlay() {
   if (pose_scatter_ && pose_scatter_->ahead) found_->Add(Hypothesis::kPlay, pose_scatter_->words);
 }
 
-bool NoiseQuestions::HasMisfit() const {
-  return found_->Leave(engine::Leaves::kMeans) || selection_.fit.hypothesis != 0;
+// Not of what a misfit makes, and not of ticks.
+bool NoiseQuestions::ScatterHasAShape() const {
+  return !ladder_->noise_floor.is_rounding && !(selection_.noise.poll_interval_s.gain_nats > 0) &&
+         !found_->Leave(engine::Leaves::kMeans) && selection_.fit.hypothesis == 0;
 }
 
 touches::NoiseSample NoiseQuestions::Sample() const {
@@ -63,10 +65,9 @@ void NoiseQuestions::AskUnevenScatter() {
               });
 }
 
-// What comes late now and then looks like more noise, or heavy-tailed. A misfit does by itself, and ticks.
+// What comes late now and then looks like more noise, or heavy-tailed.
 void NoiseQuestions::AskRandomDelay() {
-  if (ladder_->noise_floor.is_rounding || selection_.noise.poll_interval_s.gain_nats > 0 || HasMisfit())
-    return;
+  if (!ScatterHasAShape()) return;
   delay_ = FindRandomDelay(Sample(), selection_.noise, observations_.fingers);
   if (!delay_ || !delay_->ahead) return;
   found_->Add(Hypothesis::kRandomDelay, delay_->words);
@@ -74,8 +75,7 @@ void NoiseQuestions::AskRandomDelay() {
 }
 
 void NoiseQuestions::AskLopsided() {
-  if (ladder_->noise_floor.is_rounding || selection_.noise.poll_interval_s.gain_nats > 0 || HasMisfit())
-    return;
+  if (!ScatterHasAShape()) return;
   const auto lopsided = FindLopsidedScatter(Sample().groups, observations_.fingers);
   if (!lopsided) return;
   found_->Add(Hypothesis::kLopsided, lopsided->words);

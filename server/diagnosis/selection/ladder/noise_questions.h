@@ -25,7 +25,7 @@ class NoiseQuestions {
   void AddSteps(double rounds_p);
 
  private:
-  bool HasMisfit() const;
+  bool ScatterHasAShape() const;
   touches::NoiseSample Sample() const;
   void DoubtSteps(size_t first, double rounds_p);
 
