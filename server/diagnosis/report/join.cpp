@@ -173,9 +173,10 @@ std::string SummarizeJointly(const JointParts& parts) {
 Verdict VerdictOf(const JointParts& parts) {
   const Verdict verdict = WorseOf(parts.touches.verdict, parts.photographs.verdict);
   const auto& steps = parts.shared.steps;
-  const auto given = std::count_if(steps.begin(), steps.end(), [](const auto& step) { return step.given; });
-  return WorseOf(verdict, engine::VerdictOf(!parts.shared.conflicts.empty(),
-                                            given<static_cast<long>(steps.size()), given> 0));
+  const auto any = [&](bool given) {
+    return std::any_of(steps.begin(), steps.end(), [&](const auto& step) { return step.given == given; });
+  };
+  return WorseOf(verdict, engine::VerdictOf(!parts.shared.conflicts.empty(), any(false), any(true)));
 }
 
 }  // namespace
