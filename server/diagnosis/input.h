@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <absl/status/status.h>
+
 #include "server/base/threads/thread_pool.h"
 #include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
@@ -44,6 +46,12 @@ struct DiagnosisContext {
   ThreadPool* pool = nullptr;  // null: this thread alone
   // Called often, from one thread at a time. Returns false to cancel: the call then ends with CANCELLED soon.
   std::function<bool(const std::string& stage, double done)> progress;
+
+  // Tells of a stage. Error: CANCELLED.
+  absl::Status Enter(const std::string& stage, double done) const {
+    if (!progress || progress(stage, done)) return absl::OkStatus();
+    return absl::CancelledError("the diagnosis was cancelled");
+  }
 };
 
 }  // namespace touchstone::diagnosis

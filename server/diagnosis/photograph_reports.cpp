@@ -84,8 +84,7 @@ absl::StatusOr<images::PhotographDiagnosis> DiagnosedWithNext(const DiagnosisInp
     return diagnosis;
   }
   if (!always && !left.confounded) return diagnosis;
-  if (context.progress && !context.progress("choosing pictures", 0.9))
-    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("choosing pictures", 0.9));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       diagnosis.next_photographs,
       design::ProposePhotographs(expectation->photographs, left, max_photographs, input.seed, context.pool));
@@ -123,8 +122,7 @@ report::Diagnosis DescribedPhotographs(const DiagnosisInput& input, const Diagno
 
 absl::StatusOr<std::optional<report::Diagnosis>> PhotographDataErrors(const DiagnosisInput& input,
                                                                       const DiagnosisContext& context) {
-  if (context.progress && !context.progress("checking the data", 0.02))
-    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("checking the data", 0.02));
   std::vector<checks::PhotoMistake> mistakes = checks::FindPhotoMistakes(input, context);
   mistakes.erase(
       std::remove_if(mistakes.begin(), mistakes.end(),

@@ -15,7 +15,6 @@
 #include "server/diagnosis/boards/board_search.h"
 #include "server/diagnosis/engine/fit/fitted_values.h"
 #include "server/diagnosis/engine/fit/resampled_covariance.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {
@@ -23,6 +22,18 @@ namespace {
 
 constexpr double kCopyPx =
     1e-3;  // corners of two pictures that were taken scatter by a hundredth of a pixel or more
+
+// What corners may show beside effects of the catalogue.
+struct BoardHypothesis {
+  enum { kBeyondCatalogue };
+};
+const std::vector<engine::HypothesisRule>& BoardHypothesisRules() {
+  static const auto& rules = *new std::vector<engine::HypothesisRule>{
+      // Every lens effect without a name has competed with each step (BoardSearch::Compete).
+      {BoardHypothesis::kBeyondCatalogue, "lens beyond the catalogue", engine::Leaves::kBeside, {}},
+  };
+  return rules;
+}
 
 // `fullest`: the lens with all effects.
 engine::Quality QualityOf(const BoardSet& set, const LensFit& lens, const LensFit& fullest) {
@@ -176,15 +187,14 @@ absl::Status AddSteps(const BoardSet& set, const BoardSearch& search, const std:
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::SelectedStep> selected, search.Compete(last));
   for (const engine::SelectedStep& from : selected) {
     const int k = from.effect;
-    engine::LadderStep step = engine::DescribeStep(last.fit, covariance, from);
-    step.gain_nats = ladder[k + 1].fit.log_evidence - ladder[k].fit.log_evidence;
+    const engine::Fit& with_it = ladder[k + 1].fit;
+    engine::LadderStep& step =
+        engine::AddStep(last.fit, covariance, from, {}, QualityOf(set, ladder[k + 1], fullest), diagnosis);
+    step.gain_nats = with_it.log_evidence - ladder[k].fit.log_evidence;
     for (engine::ParameterEstimate& estimate : step.parameters) {
       estimate.lower = estimate.value - t * estimate.std_error;
       estimate.upper = estimate.value + t * estimate.std_error;
     }
-    step.quality = QualityOf(set, ladder[k + 1], fullest);
-    engine::AddConfounded(step, &diagnosis->confounded);
-    diagnosis->steps.push_back(std::move(step));
   }
   return absl::OkStatus();
 }
@@ -249,13 +259,11 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& all, const model::
   if (diagnosis.noise.degrees_of_freedom > 0) diagnosis.noise.sigma = fullest.fit.sigma;
   TOUCHSTONE_RETURN_IF_ERROR(AddSteps(set, *search, ladder, fullest, seed, &diagnosis));
   TOUCHSTONE_RETURN_IF_ERROR(AddRest(set, *search, ladder.back(), fullest, &diagnosis));
-  diagnosis.verdict = !diagnosis.rest.empty()    ? engine::Verdict::kUnexplained
-                      : !diagnosis.steps.empty() ? engine::Verdict::kMissingEffects
-                                                 : engine::Verdict::kAdequate;
-  if (!diagnosis.steps.empty()) {
-    diagnosis.improved_model = WithEffectsOf(model, ladder.back().fit.model.base());
-  }
-  diagnosis.lens = LensOf(set, diagnosis.improved_model ? *diagnosis.improved_model : model, diagnosis);
+  engine::Hypotheses found(BoardHypothesisRules());
+  if (!diagnosis.rest.empty()) found.Add(BoardHypothesis::kBeyondCatalogue);
+  engine::Conclude(found, 1, &diagnosis);
+  diagnosis.improved = diagnosis.changed ? WithEffectsOf(model, ladder.back().fit.model.base()) : model;
+  diagnosis.lens = LensOf(set, diagnosis.improved, diagnosis);
   diagnosis.summary = Summary(set, diagnosis);
   diagnosis.duration_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return diagnosis;

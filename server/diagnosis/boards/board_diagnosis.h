@@ -15,8 +15,7 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/boards/board_set.h"
-#include "server/diagnosis/engine/competition/result.h"
-#include "server/diagnosis/engine/fit/parameter_estimate.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/uncertainty/budget.h"
@@ -50,21 +49,17 @@ struct BoardLens {
   double fx_error_px = 0, fy_error_px = 0, cx_error_px = 0, cy_error_px = 0;
 };
 
-struct BoardDiagnosis {
-  engine::Verdict verdict = engine::Verdict::kNone;
+struct BoardDiagnosis : engine::Improvement {
   std::string model_name, model_hash;
   int pictures = 0, corners = 0;                          // that took part; corners of all pictures
   std::optional<engine::Quality> initial, final;          // none with kTooLittleData
   std::optional<engine::NothingMissing> nothing_missing;  // of the given model; none with kTooLittleData
   engine::NoiseFloor noise;
-  std::vector<engine::LadderStep> steps;
-  std::vector<engine::ConfoundedEffects> confounded;
   std::vector<BoardRest> rest;
   int pictures_needed = 0;          // with kTooLittleData
   int orientations = 0;             // of the board, kMinTiltApartDeg apart; 0: not looked at
   std::vector<std::string> copies;  // files whose corners are another's to the last digits: counted once
   std::optional<BoardLens> lens;    // none with kTooLittleData
-  std::optional<model::Model> improved_model;  // none: nothing changed
   // Of a corner that the lens predicts, the picture's pose fitted to its corners; of all pictures, px. None with kTooLittleData.
   std::vector<uncertainty::Budget> uncertainty;
   std::string summary;

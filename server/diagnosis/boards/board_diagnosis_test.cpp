@@ -46,7 +46,7 @@ TEST(BoardDiagnosis, ClaimsNothingWhereTheLensIsTheNominalOne) {
   for (uint64_t seed = 0; seed < (kUnderSanitizers ? 3 : 30); ++seed) {
     const BoardDiagnosis diagnosis = Diagnosed(MakeBoardSet(LensVector::Zero(), 12, 0.2, 100 + seed));
     claims += diagnosis.verdict != Verdict::kAdequate;
-    EXPECT_TRUE(!diagnosis.improved_model || !diagnosis.steps.empty());
+    EXPECT_TRUE(!diagnosis.changed || !diagnosis.steps.empty());
   }
   EXPECT_EQ(claims, 0);
 }
@@ -121,8 +121,8 @@ TEST(BoardDiagnosis, FindsAllThreeWithinTheirErrorsAndTheirModelHasThem) {
   ASSERT_EQ(budget.contributions.size(), 4u);
   EXPECT_EQ(budget.contributions[0].name, "repeatability");
   // Through the improved model nothing is missing any more.
-  ASSERT_TRUE(diagnosis.improved_model);
-  EXPECT_EQ(Diagnosed(set, *diagnosis.improved_model).verdict, Verdict::kAdequate);
+  ASSERT_TRUE(diagnosis.changed);
+  EXPECT_EQ(Diagnosed(set, diagnosis.improved).verdict, Verdict::kAdequate);
 }
 
 TEST(BoardDiagnosis, StandardErrorsCoverTheTruthAsOftenAsTheySay) {

@@ -287,8 +287,7 @@ absl::Status LookForMistakes(const DiagnosisInput& input, const DiagnosisContext
   if (mesh_unit) {
     problems->AddMeshUnit(*mesh_unit);
   } else if (best.empty()) {
-    if (context.progress && !context.progress("checking the data", 0.02))
-      return absl::CancelledError("the diagnosis was cancelled");
+    TOUCHSTONE_RETURN_IF_ERROR(context.Enter("checking the data", 0.02));
     const std::vector<Mistake> two = TwoMistakes(input, trial.rows(), before, context.pool);
     if (two.size() == 2)
       problems->AddBoth(two[0], two[1]);
@@ -307,8 +306,7 @@ absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const Diagnosi
   if (!o.ok() || !input.set->has_poses) return none;
   const Trial trial(input, SampleRows(*o));
   if (static_cast<int>(trial.rows().size()) < kMinTouches) return none;
-  if (context.progress && !context.progress("checking the data", 0.01))
-    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("checking the data", 0.01));
   const absl::StatusOr<TrialResult> before = trial.Run({});
   if (!before.ok() || before->objects.empty()) return none;
 

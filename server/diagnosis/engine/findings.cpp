@@ -10,6 +10,12 @@ namespace {
 constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
 constexpr double kUnexplainedShare = 0.01;  // of the noise that such a rest must add
 
+// Of any kind of measurement.
+const std::vector<HypothesisRule>& RulesOfAnyKind() {
+  static const auto& rules = *new std::vector<HypothesisRule>{{0, "misfit", Leaves::kMeans, {}}};
+  return rules;
+}
+
 class Finder {
  public:
   Finder(const Modality& modality, double noise)
@@ -29,15 +35,11 @@ class Finder {
       TOUCHSTONE_ASSIGN_OR_RETURN(whole_.fit, FitModel(experiment_, whole_.fit.model.Without(without_gain)));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(found_.final, QualityOf(found_.improved, whole_.fit, values_));
-    if (found_.steps.empty() && found_.final.rmse > initial.rmse) {
-      // New values that compare worse are none.
-      found_.improved = modality_.given();
-      found_.final = initial;
-      found_.refitted.clear(), found_.superfluous.clear();
-      values_wrong_ = false;
-    }
+    if (KeepGivenIfWorse(modality_.given(), initial, found_.final, &found_)) found_.final = initial;
     TOUCHSTONE_RETURN_IF_ERROR(Rank());
-    SetVerdict();
+    Hypotheses hypotheses(RulesOfAnyKind());
+    if (StructureRemains(found_.final, noise_)) hypotheses.Add(0);
+    Conclude(hypotheses, ExplainedShare(initial.rmse, found_.final.rmse, noise_), &found_);
     return std::move(found_);
   }
 
@@ -50,9 +52,9 @@ class Finder {
       TOUCHSTONE_ASSIGN_OR_RETURN(values_, FitModel(rows.experiment, whole_.fit.model));
     }
     const Eigen::MatrixXd covariance = modality_.CovarianceOf(rows.experiment, values_);
-    found_.improved = values_.model.base();
-    RoundValues(values_, &found_.improved);
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeGiven(covariance));
+    TOUCHSTONE_RETURN_IF_ERROR(ImproveValues(experiment_, whole_.fit, values_, covariance, modality_.given(),
+                                             modality_.objects(), &found_)
+                                   .status());
     return DescribeSteps(covariance);
   }
 
@@ -61,18 +63,6 @@ class Finder {
     TOUCHSTONE_ASSIGN_OR_RETURN(const HeldOutError heldout, modality_.HeldOut(searched, final));
     quality.heldout_rmse = heldout.Of(quality.rmse);
     return quality;
-  }
-
-  absl::Status DescribeGiven(const Eigen::MatrixXd& covariance) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(GivenEffects given,
-                                DescribeGivenEffects(experiment_, whole_.fit, values_, covariance,
-                                                     modality_.given(), modality_.objects()));
-    for (const int index : given.superfluous)
-      found_.improved.effects.erase(found_.improved.effects.begin() + index);
-    values_wrong_ = given.changed();
-    found_.superfluous = std::move(given.superfluous_names);
-    found_.refitted = std::move(given.refitted);
-    return absl::OkStatus();
   }
 
   absl::StatusOr<int> DescribeSteps(const Eigen::MatrixXd& covariance) {
@@ -84,13 +74,8 @@ class Finder {
                                              return QualityOf(ModelWith(next), next.fit,
                                                               next.whole ? values_ : next.fit);
                                            }));
-    for (const OrderedStep& next : order.steps) {
-      LadderStep step = DescribeStep(values_, covariance, *next.step);
-      AddConfounded(step, &found_.confounded);
-      step.model = ModelWith(next);
-      step.quality = next.quality;
-      found_.steps.push_back(std::move(step));
-    }
+    for (const OrderedStep& next : order.steps)
+      AddStep(values_, covariance, *next.step, ModelWith(next), next.quality, &found_);
     return order.without_gain;
   }
 
@@ -113,26 +98,12 @@ class Finder {
     return absl::OkStatus();
   }
 
-  void SetVerdict() {
-    const bool rest = StructureRemains(found_.final, noise_);
-    found_.changed = values_wrong_ || !found_.steps.empty();
-    found_.verdict = rest                    ? Verdict::kUnexplained
-                     : !found_.steps.empty() ? Verdict::kMissingEffects
-                     : values_wrong_         ? Verdict::kWrongValues
-                                             : Verdict::kAdequate;
-    if (rest)
-      DoubtBesideRest(MostBesideRest(ExplainedShare(found_.initial.rmse, found_.final.rmse, noise_), false),
-                      &found_.steps, &found_.candidates);
-    if (found_.changed && !found_.improved.name.empty()) found_.improved.name += "_better";
-  }
-
   const Modality& modality_;
   const double noise_;
   const Experiment& experiment_;
   const StepwiseSearch search_;
   Explanation whole_;
   Fit values_;
-  bool values_wrong_ = false;
   Findings found_;
 };
 

@@ -1,5 +1,5 @@
 // What one kind of measurement by itself is found to lack, from its rows alone: the whole way from an explanation to a
-// verdict. Kinds with hypotheses, noise or words of their own build on its parts (ladder.h).
+// verdict. Kinds with hypotheses, noise or words of their own build on its parts (ladder/ladder.h).
 #pragma once
 
 #include <string>
@@ -12,16 +12,8 @@
 
 namespace touchstone::diagnosis::engine {
 
-struct Findings {
-  Verdict verdict = Verdict::kNone;
-  Quality initial, final;                // of the given and of the improved model
-  std::vector<RefittedEffect> refitted;  // values of the given model's effects that must change
-  std::vector<std::string> superfluous;  // its effects that the data do without
-  std::vector<LadderStep> steps;         // in the order in which they explain most
-  std::vector<ConfoundedEffects> confounded;
-  std::vector<RankedCandidate> candidates;  // best first
-  model::Model improved;                    // the given model with steps and refits
-  bool changed = false;                     // improved differs from the given model
+struct Findings : Improvement {
+  Quality initial, final;  // of the given and of the improved model
 };
 
 // `noise`: standard deviation of the modality's errors, in its unit, that no model can go below. Errors as FitModel and as

@@ -15,18 +15,13 @@ double SecondsNow() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-absl::Status Enter(const DiagnosisContext& context, const char* stage, double done) {
-  if (!context.progress || context.progress(stage, done)) return absl::OkStatus();
-  return absl::CancelledError("the diagnosis was cancelled");
-}
-
 // What every answer begins with: how wrong the given model is.
 absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const DiagnosisContext& context,
                                           Expectation* expectation) {
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "reading", 0));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("reading", 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(expectation->photographs, MakePhotographs(input, context.pool));
   const Photographs& photographs = expectation->photographs;
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "predicting", 0.02));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("predicting", 0.02));
   TOUCHSTONE_ASSIGN_OR_RETURN(expectation->before,
                               ExpectPhotographs(photographs, *input.model, true, context.pool));
   PhotographDiagnosis diagnosis;
@@ -37,8 +32,6 @@ absl::StatusOr<PhotographDiagnosis> Begin(const DiagnosisInput& input, const Dia
   diagnosis.noise_floor = NoiseFloorOfPhotographs(photographs, expectation->before, context.pool);
   diagnosis.initial = QualityOfPhotographs(photographs, expectation->before, 0, context.pool);
   AssessByPixels(photographs, diagnosis.noise_floor, &*diagnosis.initial);
-  const double floor = diagnosis.noise_floor.sigma, rmse = diagnosis.initial->rmse;
-  diagnosis.reducible_share = rmse > floor ? 1 - floor * floor / (rmse * rmse) : 0;
   if (!diagnosis.noise_floor.from_repeats)
     diagnosis.warnings.push_back(
         "No picture was taken twice: the noise floor is an upper bound, from what neighbouring pixels differ "
@@ -71,16 +64,16 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
     diagnosis.verdict = engine::Verdict::kTooLittleData;
     diagnosis.images_needed = kMinPoses;
   } else {
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "fitting", 0.1));
+    TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.1));
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,
                                 SelectPhotoExplanation(input, expectation->photographs, context));
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "describing", 0.85));
+    TOUCHSTONE_RETURN_IF_ERROR(context.Enter("describing", 0.85));
     expectation->left = FindExplanationsLeft(selection);
     TOUCHSTONE_RETURN_IF_ERROR(DescribeExplanation(input, context, expectation->photographs, selection,
                                                    expectation->before, &diagnosis, &expectation->after));
   }
   diagnosis.duration_s = SecondsNow() - began;
-  TOUCHSTONE_RETURN_IF_ERROR(Enter(context, "done", 1));
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("done", 1));
   return diagnosis;
 }
 

@@ -9,13 +9,8 @@ ExplanationsLeft FindExplanationsLeft(const PhotoSelection& selection) {
   ExplanationsLeft left = {
       engine::FindExplanationsLeft(selection.fit, selection.steps, selection.fit.model.base()),
       selection.photographs->noise};
-  for (auto& [name, model] : left.models) {
-    model::Model without = *model;
-    for (size_t e = without.effects.size(); e-- > 0;)
-      if (without.effects[e].effect->name == kImageFieldName)
-        without.effects.erase(without.effects.begin() + static_cast<long>(e));
-    model = std::make_shared<const model::Model>(std::move(without));
-  }
+  for (auto& [name, model] : left.models)
+    model = std::make_shared<const model::Model>(WithoutImageField(*model));
   return left;
 }
 

@@ -33,7 +33,7 @@ PhotographDiagnosis DiagnosisOf(const DiagnosisInput& input) {
 // What a comparison finds with the improved model, or the given one, and this effect behind it.
 double ErrorWith(const DiagnosisInput& input, const PhotographDiagnosis& diagnosis,
                  const std::string& effect) {
-  const std::string improved = model::FormatModel(diagnosis.improved_model.value_or(*input.model));
+  const std::string improved = model::FormatModel(diagnosis.changed ? diagnosis.improved : *input.model);
   const auto with = model::ParseModel(absl::StrCat(improved, effect), "with", effects::Catalogue());
   EXPECT_TRUE(with.ok()) << with.status();
   if (!with.ok()) return NAN;

@@ -7,7 +7,7 @@
 
 namespace touchstone::diagnosis::images {
 
-// Fills verdict, noise floor, errors, steps, refits, unexplained and the improved model of `diagnosis`; `after`: the
+// Fills the improvement, noise floor and errors of `diagnosis`; `after`: the
 // pictures that the improved model expects, empty if nothing changed.
 absl::Status DescribeExplanation(const DiagnosisInput& input, const DiagnosisContext& context,
                                  const Photographs& photographs, const PhotoSelection& selection,
@@ -15,7 +15,7 @@ absl::Status DescribeExplanation(const DiagnosisInput& input, const DiagnosisCon
                                  std::vector<image::Photo>* after);
 
 // The noise of the pixels as a step or a refit of the improved model.
-void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality, bool* refitted,
-                   model::Model* improved, PhotographDiagnosis* diagnosis);
+void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality,
+                   engine::Improvement* improvement);
 
 }  // namespace touchstone::diagnosis::images

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/images/photo_ladder.h"
 #include "server/effects/all_effects.h"
 
@@ -27,8 +26,8 @@ engine::ParameterEstimate Estimate(const model::ParameterInfo& parameter, double
 
 }  // namespace
 
-void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality, bool* refitted,
-                   model::Model* improved, PhotographDiagnosis* diagnosis) {
+void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality& quality,
+                   engine::Improvement* improvement) {
   const std::shared_ptr<const model::Effect> effect = effects::FindByRole(model::EffectRole::kPixelNoise);
   const double sigma =
       std::sqrt(std::max(found.sigma_grey * found.sigma_grey - kRounding / std::max(channels, 1), 0.0));
@@ -37,24 +36,15 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
   const double error = sigma > 0 ? found.sigma_error * found.sigma_grey / sigma : found.sigma_error;
   std::vector<engine::ParameterEstimate> parameters = {
       Estimate(effect->parameters[0], sigma, error), Estimate(effect->parameters[1], gain, found.gain_error)};
-  const auto own = std::find_if(
-      improved->effects.begin(), improved->effects.end(),
-      [&](const model::EffectInstance& instance) { return instance.effect->name == effect->name; });
-  if (own == improved->effects.end()) {
+  std::vector<model::EffectInstance>& effects = improvement->improved.effects;
+  const auto own = std::find_if(effects.begin(), effects.end(), [&](const model::EffectInstance& instance) {
+    return instance.effect->name == effect->name;
+  });
+  if (own == effects.end()) {
     if (sigma < kMinSigmaGrey && gain == 0) return;
-    model::EffectInstance instance;
-    instance.effect = effect;
-    instance.values = {sigma, gain};
-    improved->effects.push_back(instance);
-    engine::LadderStep step;
-    step.effect = effect->name;
-    step.probability = engine::kMaxProbability;
-    step.parameters = parameters;
-    step.quality = quality;
-    step.model = *improved;
-    engine::AddTexts(*effect, &step);
-    diagnosis->steps.push_back(std::move(step));
-    *refitted = true;
+    engine::LadderStep& step = engine::AddNoiseStep(effect, {sigma, gain}, std::move(parameters),
+                                                    engine::kMaxProbability, quality, improvement);
+    step.model = improvement->improved;
     return;
   }
   const double at_middle = 127;
@@ -63,9 +53,9 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
   if (std::abs(after - before) < std::max(kSeenShare * before, kSeenErrors * found.sigma_error)) return;
   parameters[0].before = own->values[0];
   parameters[1].before = own->values[1];
-  diagnosis->refitted.push_back({effect->name, parameters});
+  improvement->refitted.push_back({effect->name, parameters});
   own->values = {sigma, gain};
-  *refitted = true;
+  improvement->changed = true;
 }
 
 }  // namespace touchstone::diagnosis::images

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/diagnosis/engine/competition/result.h"
-#include "server/diagnosis/engine/fit/parameter_estimate.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"
@@ -59,25 +58,15 @@ struct ProposedPhotograph {
   int photographs_to_verdict = 0;  // as design::ProposedTouch::touches_to_verdict
 };
 
-struct PhotographDiagnosis {
-  engine::Verdict verdict = engine::Verdict::kNone;
+struct PhotographDiagnosis : engine::Improvement {
   std::string model_name, model_hash;
   int images = 0;  // that took part
   std::vector<std::string> objects;
   engine::NoiseFloor noise_floor;
   std::optional<engine::Quality> initial, final;
-  double reducible_share = 0;  // of the mean square error that is not noise, 0 to 1
   std::optional<engine::NothingMissing> nothing_missing;  // none: too few pictures
-
-  std::vector<engine::RefittedEffect> refitted;
-  std::vector<engine::LadderStep> steps;
-  std::vector<engine::RankedCandidate> candidates;
-  std::vector<engine::ConfoundedEffects> confounded;
-  std::vector<std::string> superfluous;
   std::vector<engine::DataProblem> data_problems;
-  std::optional<engine::UnexplainedRest> unexplained;
-  int images_needed = 0;                       // with kTooLittleData
-  std::optional<model::Model> improved_model;  // none: nothing changed
+  int images_needed = 0;  // with kTooLittleData
   std::vector<uncertainty::Budget>
       uncertainty;  // of its predictions, by object and of all; grey levels of one pixel
   std::vector<ProposedPhotograph> next_photographs;

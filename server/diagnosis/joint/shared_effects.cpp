@@ -8,20 +8,30 @@
 #include <set>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/ladder/hypotheses.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
-#include "server/diagnosis/joint/shared_search.h"
+#include "server/diagnosis/joint/conflicts.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr double kConflictNats = 9;  // that values of their own need over one value
-constexpr double kConflictP = 1e-4;  // ... and of values so far apart by chance
-constexpr double kShownP = 1e-3;     // of a value that one kind alone has by chance
-constexpr double kUnknown = 10;      // usual sizes: a value that is known no better is not known
+constexpr double kShownP = 1e-3;  // of a value that one kind alone has by chance
+constexpr double kUnknown = 10;   // usual sizes: a value that is known no better is not known
 
-bool HasName(const std::vector<SharedEffect>& effects, const std::string& name) {
-  return std::any_of(effects.begin(), effects.end(),
-                     [&](const SharedEffect& effect) { return effect.name() == name; });
+// What several kinds together may show beside effects that each names by itself, in the order in which it is asked.
+struct JointHypothesis {
+  enum { kConflict, kUndecided, kSharedCause };
+};
+const std::vector<engine::HypothesisRule>& JointHypothesisRules() {
+  using J = JointHypothesis;
+  using L = engine::Leaves;
+  static const auto& rules = *new std::vector<engine::HypothesisRule>{
+      // Where one kind wants another value than another, nothing is averaged.
+      {J::kConflict, "conflict", L::kMeans, {J::kSharedCause}},
+      {J::kUndecided, "undecided", L::kNothing, {}},
+      {J::kSharedCause, "shared cause", L::kNothing, {}},
+  };
+  return rules;
 }
 
 class SharedFinder {
@@ -47,10 +57,10 @@ class SharedFinder {
     TOUCHSTONE_RETURN_IF_ERROR(Enter(0));
     TOUCHSTONE_ASSIGN_OR_RETURN(const SharedSelection selection, SearchShared(sides_));
     TOUCHSTONE_RETURN_IF_ERROR(Enter(0.7));
-    TOUCHSTONE_RETURN_IF_ERROR(FindConflicts(selection));
-    FindUndecided(selection);
-    if (found_.conflicts.empty() && !selection.best.shared.empty())
-      TOUCHSTONE_RETURN_IF_ERROR(Describe(selection));
+    using J = JointHypothesis;
+    TOUCHSTONE_RETURN_IF_ERROR(hypotheses_.Ask({{J::kConflict, [&] { return AskConflict(selection); }},
+                                                {J::kUndecided, [&] { return FindUndecided(selection); }},
+                                                {J::kSharedCause, [&] { return Describe(selection); }}}));
     return std::move(found_);
   }
 
@@ -60,83 +70,13 @@ class SharedFinder {
                                          : absl::CancelledError("the diagnosis was cancelled");
   }
 
-  // Values of one effect as one kind alone has them beside its own explanation.
-  struct AloneValues {
-    engine::Fit fit;
-    Eigen::MatrixXd covariance;
-    int index = -1;
-  };
-  absl::StatusOr<AloneValues> FitAlone(const Side& side, const SharedEffect& effect) const {
-    const engine::Modality& modality = *side.modality;
-    std::vector<SharedEffect> shared = side.SharedOf(modality.alone());
-    if (!HasName(shared, effect.name())) shared.push_back(effect);
-    AloneValues values;
-    TOUCHSTONE_ASSIGN_OR_RETURN(values.fit,
-                                engine::FitModel(modality.experiment(), side.Free(shared, side.own_alone())));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const engine::FinalRows rows, modality.RowsNear(values.fit));
-    if (rows.owner != nullptr) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(values.fit, engine::FitModel(rows.experiment, values.fit.model));
-    }
-    values.covariance = modality.CovarianceOf(rows.experiment, values.fit);
-    values.index = IndexOf(values.fit.model.base(), effect.name());
-    return values;
-  }
-
-  absl::Status FindConflicts(const SharedSelection& selection) {
-    std::vector<Part> parts;
-    std::vector<SharedEffect> in_doubt;
-    for (const Side& side : sides_) {
-      parts.push_back({&side.modality->experiment(), side.modality->alone().model, 1});
-      for (const SharedEffect& effect : side.SharedOf(side.modality->alone()))
-        if (!HasName(in_doubt, effect.name())) in_doubt.push_back(effect);
-    }
-    TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit apart,
-                                FitJointly(parts, [](const engine::Parameterization&, int) { return true; }));
-    const double ahead = apart.log_evidence - selection.best.fit.log_evidence;
-    if (ahead < kConflictNats) return absl::OkStatus();
-    for (const SharedEffect& effect : in_doubt) {
-      std::vector<std::pair<int, AloneValues>> alone;
-      for (const Side& side : sides_) {
-        if (!side.modality->Sees(*effect.instance.effect)) continue;
-        TOUCHSTONE_ASSIGN_OR_RETURN(AloneValues values, FitAlone(side, effect));
-        alone.emplace_back(side.kind, std::move(values));
-      }
-      for (size_t i = 0; i < alone.size(); ++i)
-        for (size_t j = i + 1; j < alone.size(); ++j) CompareValues(effect.name(), alone[i], alone[j], ahead);
-    }
-    return absl::OkStatus();
-  }
-
-  void CompareValues(const std::string& name, const std::pair<int, AloneValues>& a,
-                     const std::pair<int, AloneValues>& b, double ahead) {
-    const AloneValues &one = a.second, &other = b.second;
-    std::vector<std::pair<int, int>> same;
-    for (int i = 0; i < one.fit.model.size(); ++i)
-      for (int j = 0; j < other.fit.model.size(); ++j)
-        if (one.fit.model.parameters()[i].effect == one.index &&
-            IsSameValue(one.fit.model, i, other.fit.model, j))
-          same.emplace_back(i, j);
-    const int n = static_cast<int>(same.size());
-    Eigen::VectorXd difference(n);
-    Eigen::MatrixXd covariance(n, n);
-    for (int r = 0; r < n; ++r) {
-      difference[r] = one.fit.point[same[r].first] - other.fit.point[same[r].second];
-      for (int c = 0; c < n; ++c)
-        covariance(r, c) =
-            one.covariance(same[r].first, same[c].first) + other.covariance(same[r].second, same[c].second);
-    }
-    const double p = engine::WaldP(difference, covariance);
-    if (p > kConflictP) return;
-    found_.conflicts.push_back({name,
-                                {a.first, b.first},
-                                {one.fit.model.Describe(one.index, one.fit.point, one.covariance),
-                                 other.fit.model.Describe(other.index, other.fit.point, other.covariance)},
-                                p,
-                                ahead});
+  absl::Status AskConflict(const SharedSelection& selection) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(found_.conflicts, FindConflicts(sides_, selection));
+    return hypotheses_.AddIf(!found_.conflicts.empty(), JointHypothesis::kConflict);
   }
 
   // What explains as much as the best, with a shared effect in the place of others.
-  void FindUndecided(const SharedSelection& selection) {
+  absl::Status FindUndecided(const SharedSelection& selection) {
     for (const JointExplanation& tried : selection.tried) {
       if (tried.fit.log_evidence < selection.best.fit.log_evidence - engine::SearchRules().equivalent_nats)
         continue;
@@ -149,6 +89,7 @@ class SharedFinder {
         if (!instead.empty()) found_.undecided.push_back({effect.name(), std::move(instead)});
       }
     }
+    return absl::OkStatus();
   }
   static const std::string& NameOfShared(const SharedEffect& effect) { return effect.name(); }
   static const std::string& NameOfShared(const Undecided& undecided) { return undecided.effect; }
@@ -180,6 +121,7 @@ class SharedFinder {
   }
 
   absl::Status Describe(const SharedSelection& selection) {
+    if (selection.best.shared.empty()) return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit fit, Polish(selection.best));
     std::vector<SharedEffect> in_place;
     for (const SharedEffect& shared : selection.best.shared) {
@@ -295,7 +237,7 @@ class SharedFinder {
     step->equivalent.erase(std::unique(step->equivalent.begin(), step->equivalent.end()),
                            step->equivalent.end());
     step->gain_nats = best - without;
-    step->probability = engine::ProbabilityOfShare(engine::LogSum(same) - engine::LogSum(all));
+    step->probability = engine::ProbabilityAmong(same, all);
     std::vector<std::string> shown_by;
     for (const Side& side : sides_)
       if (ShownBy(side.kind, shared.name(), selection.best.fit)) shown_by.push_back(side.modality->name());
@@ -307,18 +249,8 @@ class SharedFinder {
   // Whether one kind, with everything else in place, has a value that chance would not give it.
   static bool ShownBy(int kind, const std::string& name, const JointFit& fit) {
     const engine::Fit& own = fit.fits[kind];
-    const int index = IndexOf(own.model.base(), name);
-    std::vector<int> members;
-    for (int i = 0; i < own.model.size(); ++i)
-      if (own.model.parameters()[i].effect == index) members.push_back(i);
-    const int n = static_cast<int>(members.size());
-    Eigen::VectorXd difference(n);
-    Eigen::MatrixXd covariance(n, n);
-    for (int a = 0; a < n; ++a) {
-      difference[a] = fit.alone[kind][members[a]] - own.model.parameters()[members[a]].neutral;
-      for (int b = 0; b < n; ++b) covariance(a, b) = own.covariance(members[a], members[b]);
-    }
-    return engine::WaldP(difference, covariance) < kShownP;
+    return engine::NeutralP(own.model, IndexOf(own.model.base(), name), fit.alone[kind], own.covariance) <
+           kShownP;
   }
 
   const std::vector<const engine::Modality*>& kinds_;
@@ -326,6 +258,7 @@ class SharedFinder {
   const std::function<bool(double)>& progress_;
   Sides sides_;
   SharedEffects found_;
+  engine::Hypotheses hypotheses_{JointHypothesisRules()};
 };
 
 }  // namespace

@@ -29,6 +29,21 @@ void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagn
   if (found) diagnosis->p_nothing_missing = found->p;
 }
 
+void AddImprovement(const engine::Improvement& improvement, Diagnosis* diagnosis) {
+  DataReport& data = diagnosis->data[0];
+  diagnosis->verdict = improvement.verdict;
+  diagnosis->refitted = improvement.refitted;
+  for (const engine::LadderStep& step : improvement.steps) {
+    diagnosis->steps.push_back({step, {}});
+    data.after_step.push_back(step.quality);
+  }
+  diagnosis->superfluous = improvement.superfluous;
+  diagnosis->confounded = improvement.confounded;
+  data.candidates = improvement.candidates;
+  data.unexplained = improvement.unexplained;
+  if (improvement.changed) diagnosis->improved_model = improvement.improved;
+}
+
 double ReducibleShare(const NoiseFloor& floor, double rmse) {
   return rmse > 0 ? std::clamp(1 - floor.sigma * floor.sigma / (rmse * rmse), 0.0, 1.0) : 0;
 }

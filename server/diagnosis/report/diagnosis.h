@@ -13,7 +13,7 @@
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/engine/competition/detectability.h"
 #include "server/diagnosis/engine/competition/effect_explanation.h"
-#include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/nothing_missing.h"
 #include "server/diagnosis/images/photograph_diagnosis.h"
 #include "server/diagnosis/joint/session_changes.h"
@@ -211,6 +211,9 @@ struct Diagnosis {
 
 // None: not assessed.
 void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagnosis* diagnosis);
+
+// Verdict, steps and all else that every kind of measurement is told of, in the unit of data[0].
+void AddImprovement(const engine::Improvement& improvement, Diagnosis* diagnosis);
 
 // The share of a squared error that is the model's, not noise: 0 to 1.
 double ReducibleShare(const NoiseFloor& floor, double rmse);

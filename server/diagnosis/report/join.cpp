@@ -80,11 +80,7 @@ Step SharedStepOf(const joint::SharedStep& from) {
   step.words = from.words;
   if (step.shown_by.size() == 1)
     absl::StrAppend(&step.words, step.words.empty() ? "" : "; ", "only the ", from.shown_by, " show it");
-  if (const auto effect = effects::Catalogue().Find(from.effect)) {
-    step.meaning = effect->meaning;
-    step.check_on_rig = effect->check_on_rig;
-    step.remedy = effect->remedy;
-  }
+  if (const auto effect = effects::Catalogue().Find(from.effect)) engine::AddTexts(*effect, &step);
   return step;
 }
 
@@ -175,11 +171,12 @@ std::string SummarizeJointly(const JointParts& parts) {
 
 // A conflict is worse than what a named effect explains.
 Verdict VerdictOf(const JointParts& parts) {
-  Verdict verdict = WorseOf(parts.touches.verdict, parts.photographs.verdict);
-  if (!parts.shared.conflicts.empty()) return WorseOf(verdict, Verdict::kUnexplained);
-  for (const joint::SharedStep& step : parts.shared.steps)
-    verdict = WorseOf(verdict, step.given ? Verdict::kWrongValues : Verdict::kMissingEffects);
-  return verdict;
+  const Verdict verdict = WorseOf(parts.touches.verdict, parts.photographs.verdict);
+  const auto& steps = parts.shared.steps;
+  const auto any = [&](bool given) {
+    return std::any_of(steps.begin(), steps.end(), [&](const auto& step) { return step.given == given; });
+  };
+  return WorseOf(verdict, engine::VerdictOf(!parts.shared.conflicts.empty(), any(false), any(true)));
 }
 
 }  // namespace

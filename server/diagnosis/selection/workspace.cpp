@@ -294,15 +294,13 @@ absl::StatusOr<std::unique_ptr<Workspace>> MakeWorkspace(const DiagnosisInput& i
   auto workspace = std::make_unique<Workspace>();
   workspace->input = input;
   workspace->context = context;
-  if (context.progress && !context.progress("reading", 0))
-    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("reading", 0));
   TOUCHSTONE_ASSIGN_OR_RETURN(touches::Observations observations, touches::MakeObservations(input));
   workspace->observations = std::make_unique<touches::Observations>(std::move(observations));
   touches::Observations& o = *workspace->observations;
   workspace->predictor = std::make_unique<touches::Predictor>(o, context.pool);
   workspace->comparable = o.used;
-  if (context.progress && !context.progress("predicting", 0.02))
-    return absl::CancelledError("the diagnosis was cancelled");
+  TOUCHSTONE_RETURN_IF_ERROR(context.Enter("predicting", 0.02));
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->nominal, workspace->predictor->Run(*input.model, true, true));
   TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(o, workspace->nominal, &workspace->warnings));
   TOUCHSTONE_RETURN_IF_ERROR(CheckUnits(o, workspace->nominal));

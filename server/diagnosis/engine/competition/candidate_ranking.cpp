@@ -53,8 +53,7 @@ class Ranking {
 
   std::vector<RankedCandidate> Finish() {
     for (RankedCandidate& candidate : ranked_)
-      if (candidate.explains())
-        candidate.probability = ProbabilityOfShare(candidate.gain_nats - LogSum(all_));
+      if (candidate.explains()) candidate.probability = ProbabilityAmong({candidate.gain_nats}, all_);
     std::stable_sort(ranked_.begin(), ranked_.end(), [](const RankedCandidate& a, const RankedCandidate& b) {
       return a.explains() != b.explains() ? a.explains() : a.gain_nats > b.gain_nats;
     });

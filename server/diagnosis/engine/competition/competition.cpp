@@ -103,7 +103,7 @@ absl::StatusOr<SelectedStep> AssessStep(const StepwiseSearch& search, const Expl
     all.push_back(rival->second.ahead_nats);
     if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
   }
-  step.probability = ProbabilityOfShare(LogSum(same_or_equivalent) - LogSum(all));
+  step.probability = ProbabilityAmong(same_or_equivalent, all);
   return step;
 }
 
@@ -169,8 +169,27 @@ double ProbabilityOfShare(double log_share) {
   return std::min(kMaxProbability, std::exp(log_share));
 }
 
+double ProbabilityAmong(const std::vector<double>& same, const std::vector<double>& all) {
+  return ProbabilityOfShare(LogSum(same) - LogSum(all));
+}
+
 double ProbabilityOf(double log_odds) {
   return ProbabilityOfShare(-std::log1p(std::exp(-log_odds)));
+}
+
+double NeutralP(const Parameterization& model, int effect, const Eigen::VectorXd& point,
+                const Eigen::MatrixXd& covariance) {
+  std::vector<int> own;
+  for (int i = 0; i < model.size(); ++i)
+    if (model.parameters()[i].effect == effect) own.push_back(i);
+  const int n = static_cast<int>(own.size());
+  Eigen::VectorXd value(n);
+  Eigen::MatrixXd part(n, n);
+  for (int a = 0; a < n; ++a) {
+    value[a] = point[own[a]] - model.parameters()[own[a]].neutral;
+    for (int b = 0; b < n; ++b) part(a, b) = covariance(own[a], own[b]);
+  }
+  return WaldP(value, part);
 }
 
 double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance) {

@@ -73,6 +73,14 @@ double ProbabilityOfShare(double log_share);
 // The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);
 
+// Of the explanation in question and what the data cannot tell from it, by their log evidence among all that could explain
+// the same.
+double ProbabilityAmong(const std::vector<double>& same, const std::vector<double>& all);
+
+// P of the values of an effect if it changed nothing, by WaldP.
+double NeutralP(const Parameterization& model, int effect, const Eigen::VectorXd& point,
+                const Eigen::MatrixXd& covariance);
+
 // P of values at least as far from zero as `difference` by chance, by Wald's test; values without a variance take no part.
 // 1 where nothing is known.
 double WaldP(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance);

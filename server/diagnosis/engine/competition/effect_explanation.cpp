@@ -123,7 +123,7 @@ absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, co
   std::vector<double> all = {0, explained.gain_nats};
   for (const Extension& other : extensions)
     if (other.visible && other.name != effect) all.push_back(other.log_evidence - initial.log_evidence);
-  explained.probability = explained.changes ? ProbabilityOfShare(explained.gain_nats - LogSum(all)) : 0;
+  explained.probability = explained.changes ? ProbabilityAmong({explained.gain_nats}, all) : 0;
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.taken_over, FindTakenOver(search, initial, extensions, explained));
   return explained;
 }

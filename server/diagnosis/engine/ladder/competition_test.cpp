@@ -99,14 +99,18 @@ TEST_F(CompetitionTest, ValueOfTheModelThatIsZeroIsSuperfluousAndAnotherIsRefitt
   free.Free(0, true);
   free.Free(1, true);
   const Fit fit = *FitModel(experiment, free);
-  const auto found = DescribeGivenEffects(experiment, fit, fit, fit.covariance, given, rows.groups());
-  ASSERT_TRUE(found.ok());
-  EXPECT_EQ(found->superfluous, std::vector<int>{0});
-  EXPECT_EQ(found->superfluous_names, std::vector<std::string>{"object_push"});
-  ASSERT_EQ(found->refitted.size(), 1u);
-  EXPECT_EQ(found->refitted[0].effect, "gravity_sag");
-  EXPECT_NEAR(*found->refitted[0].parameters[0].before, 2 * kHiddenM * 1e3, 1e-12);
-  EXPECT_NEAR(found->refitted[0].parameters[0].value, kHiddenM * 1e3, 0.05);
+  Improvement found;
+  const auto superfluous = ImproveValues(experiment, fit, fit, fit.covariance, given, rows.groups(), &found);
+  ASSERT_TRUE(superfluous.ok());
+  EXPECT_EQ(*superfluous, std::vector<int>{0});
+  EXPECT_EQ(found.superfluous, std::vector<std::string>{"object_push"});
+  ASSERT_EQ(found.improved.effects.size(), 1u);
+  EXPECT_EQ(found.improved.effects[0].effect->name, "gravity_sag");
+  EXPECT_TRUE(found.changed && found.values_wrong);
+  ASSERT_EQ(found.refitted.size(), 1u);
+  EXPECT_EQ(found.refitted[0].effect, "gravity_sag");
+  EXPECT_NEAR(*found.refitted[0].parameters[0].before, 2 * kHiddenM * 1e3, 1e-12);
+  EXPECT_NEAR(found.refitted[0].parameters[0].value, kHiddenM * 1e3, 0.05);
 }
 
 TEST(ExplanationsLeft, AreTheModelAloneWithoutAStep) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/where_in_words.h"
@@ -26,8 +27,7 @@ bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& e
   return true;
 }
 
-}  // namespace
-
+// Everything but the error and the model.
 LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from) {
   const model::EffectInstance& instance = values.model.base().effects[from.effect];
   LadderStep step;
@@ -52,6 +52,94 @@ LadderStep DescribeStep(const Fit& values, const Eigen::MatrixXd& covariance, co
   return step;
 }
 
+}  // namespace
+
+absl::StatusOr<std::vector<int>> ImproveValues(const Experiment& experiment, const Fit& selected,
+                                               const Fit& values, const Eigen::MatrixXd& covariance,
+                                               const model::Model& given,
+                                               const std::vector<std::string>& objects,
+                                               Improvement* improvement) {
+  improvement->improved = values.model.base();
+  RoundValues(values, &improvement->improved);
+  const Parameterization initial(given, objects);
+  std::vector<int> superfluous;
+  for (int index = static_cast<int>(given.effects.size()) - 1; index >= 0; --index) {
+    if (!values.model.IsFree(index)) continue;
+    improvement->values_wrong = improvement->changed = true;
+    const model::Effect& effect = *given.effects[index].effect;
+    RefittedEffect refit = {NameOf(effect), values.model.Describe(index, values.point, covariance)};
+    if (IsZero(effect, refit.parameters)) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, FitModel(experiment, selected.model.Without(index)));
+      if (without.log_evidence >= selected.log_evidence) {
+        improvement->improved.effects.erase(improvement->improved.effects.begin() + index);
+        superfluous.push_back(index);
+        improvement->superfluous.push_back(refit.effect);
+        continue;
+      }
+    }
+    const std::vector<ParameterEstimate> old = initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
+    for (size_t j = 0; j < refit.parameters.size() && j < old.size(); ++j)
+      refit.parameters[j].before = old[j].value;
+    improvement->refitted.insert(improvement->refitted.begin(), std::move(refit));
+  }
+  return superfluous;
+}
+
+bool KeepGivenIfWorse(const model::Model& given, const Quality& initial, const Quality& final,
+                      Improvement* improvement) {
+  if (!improvement->steps.empty() || !improvement->values_wrong || !(final.rmse > initial.rmse)) return false;
+  improvement->improved = given;
+  improvement->refitted.clear(), improvement->superfluous.clear();
+  improvement->values_wrong = improvement->changed = false;
+  return true;
+}
+
+LadderStep& AddStep(const Fit& values, const Eigen::MatrixXd& covariance, const SelectedStep& from,
+                    const model::Model& model, const Quality& quality, Improvement* improvement) {
+  LadderStep& step = improvement->steps.emplace_back(DescribeStep(values, covariance, from));
+  AddConfounded(step, &improvement->confounded);
+  step.model = model;
+  step.quality = quality;
+  improvement->changed = true;
+  return step;
+}
+
+LadderStep& AddNoiseStep(const std::shared_ptr<const model::Effect>& effect, std::vector<double> values,
+                         std::vector<ParameterEstimate> estimates, double probability, const Quality& quality,
+                         Improvement* improvement) {
+  improvement->improved.effects.push_back({effect, false, std::move(values), {}});
+  improvement->changed = true;
+  LadderStep& step = improvement->steps.emplace_back();
+  step.effect = effect->name;
+  AddTexts(*effect, &step);
+  step.probability = probability;
+  step.parameters = std::move(estimates);
+  step.quality = quality;
+  return step;
+}
+
+Verdict VerdictOf(bool rest, bool steps, bool values_wrong) {
+  return rest           ? Verdict::kUnexplained
+         : steps        ? Verdict::kMissingEffects
+         : values_wrong ? Verdict::kWrongValues
+                        : Verdict::kAdequate;
+}
+
+void Conclude(const Hypotheses& found, double explained_share, Improvement* improvement) {
+  improvement->verdict =
+      VerdictOf(found.Leave(Leaves::kBeside), !improvement->steps.empty(), improvement->values_wrong);
+  if (improvement->changed && !improvement->improved.name.empty()) improvement->improved.name += "_better";
+  if (!found.Leave(Leaves::kMeans)) return;
+  const double most =
+      found.Leave(Leaves::kDoubts) ? kDoubted : kDoubted + (kMaxBesideRest - kDoubted) * explained_share;
+  for (LadderStep& step : improvement->steps) {
+    step.probability = std::min(step.probability, most);
+    AddWords("Beside it a rest remains unexplained: it may stand in for something else.", &step);
+  }
+  for (RankedCandidate& candidate : improvement->candidates)
+    candidate.probability = std::min(candidate.probability, most);
+}
+
 void AddConfounded(const LadderStep& step, std::vector<ConfoundedEffects>* confounded) {
   if (step.equivalent.empty()) return;
   std::vector<std::string> names = {step.effect};
@@ -59,49 +147,10 @@ void AddConfounded(const LadderStep& step, std::vector<ConfoundedEffects>* confo
   confounded->push_back({std::move(names), step.discriminating_measurement});
 }
 
-absl::StatusOr<GivenEffects> DescribeGivenEffects(const Experiment& experiment, const Fit& selected,
-                                                  const Fit& values, const Eigen::MatrixXd& covariance,
-                                                  const model::Model& given,
-                                                  const std::vector<std::string>& objects) {
-  const Parameterization initial(given, objects);
-  GivenEffects found;
-  for (int index = static_cast<int>(given.effects.size()) - 1; index >= 0; --index) {
-    if (!values.model.IsFree(index)) continue;
-    const model::Effect& effect = *given.effects[index].effect;
-    RefittedEffect refit = {NameOf(effect), values.model.Describe(index, values.point, covariance)};
-    if (IsZero(effect, refit.parameters)) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const Fit without, FitModel(experiment, selected.model.Without(index)));
-      if (without.log_evidence >= selected.log_evidence) {
-        found.superfluous.push_back(index);
-        found.superfluous_names.push_back(refit.effect);
-        continue;
-      }
-    }
-    const std::vector<ParameterEstimate> old = initial.Describe(index, Eigen::VectorXd(), Eigen::MatrixXd());
-    for (size_t j = 0; j < refit.parameters.size() && j < old.size(); ++j)
-      refit.parameters[j].before = old[j].value;
-    found.refitted.insert(found.refitted.begin(), std::move(refit));
-  }
-  return found;
-}
-
 double ExplainedShare(double rmse_before, double rmse_after, double noise) {
   const double before = rmse_before * rmse_before - noise * noise;
   const double after = rmse_after * rmse_after - noise * noise;
   return before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
-}
-
-double MostBesideRest(double explained_share, bool doubted) {
-  return doubted ? kDoubted : kDoubted + (kMaxBesideRest - kDoubted) * explained_share;
-}
-
-void DoubtBesideRest(double most, std::vector<LadderStep>* steps, std::vector<RankedCandidate>* candidates) {
-  for (LadderStep& step : *steps) {
-    step.probability = std::min(step.probability, most);
-    AddWords("Beside it a rest remains unexplained: it may stand in for something else.", &step);
-  }
-  for (RankedCandidate& candidate : *candidates)
-    candidate.probability = std::min(candidate.probability, most);
 }
 
 void AddWords(const std::string& words, LadderStep* step) {

@@ -33,6 +33,18 @@ std::shared_ptr<const model::Effect> ImageFieldEffect() {
   return effect;
 }
 
+int IndexOfImageField(const model::Model& model) {
+  for (size_t index = 0; index < model.effects.size(); ++index)
+    if (model.effects[index].effect->name == kImageFieldName) return static_cast<int>(index);
+  return -1;
+}
+
+model::Model WithoutImageField(model::Model model) {
+  if (const int index = IndexOfImageField(model); index >= 0)
+    model.effects.erase(model.effects.begin() + index);
+  return model;
+}
+
 Eigen::MatrixXf ImageFieldFunctions(int width, int height) {
   // Waves of one direction, a column each.
   const auto waves_along = [](int pixels) {

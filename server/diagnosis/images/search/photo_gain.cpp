@@ -18,24 +18,17 @@ namespace {
 
 constexpr double kLargeShare = 0.6;   // of the excess on unseen pictures, that a step beside a rest takes
 constexpr double kLargeMisfit = 1.2;  // of the noise, from where such steps are looked for
-constexpr double kNearChoice = 0.1;   // of a choice, that a fitted mean of two is it
 constexpr int kMaxLargeSteps = 3, kMaxLargeTried = 4;
-
-model::Model NamedPartOf(const model::Model& model) {
-  model::Model named = model;
-  named.effects.erase(
-      std::remove_if(named.effects.begin(), named.effects.end(),
-                     [](const auto& instance) { return instance.effect->name == kImageFieldName; }),
-      named.effects.end());
-  return named;
-}
+constexpr double kStepP = 1e-4;      // of a step's values, with the scatter between pictures
+constexpr double kFaint = 0.1;       // of the noise
+constexpr double kNearChoice = 0.1;  // of a choice, that a fitted mean of two is it
 
 // Root mean square over all pixels of all photographs.
 absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Model& model, ThreadPool* pool) {
   std::vector<int> all(photographs.size());
   std::iota(all.begin(), all.end(), 0);
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> squares,
-                              SquaredErrors(photographs, NamedPartOf(model), all, pool));
+                              SquaredErrors(photographs, WithoutImageField(model), all, pool));
   const double pixels =
       static_cast<double>(photographs.width()) * photographs.height() * std::max(photographs.size(), 1);
   return std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) / pixels);
@@ -45,7 +38,7 @@ absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Mode
 absl::StatusOr<double> NoiseOfPixels(const Photographs& photographs, const model::Model& model,
                                      ThreadPool* pool) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
-                              ExpectPhotographs(photographs, NamedPartOf(model), false, pool));
+                              ExpectPhotographs(photographs, WithoutImageField(model), false, pool));
   double variance = 0, pixels = 0;
   for (const image::Photo& photo : expected) {
     for (const float grey : photo.grey) variance += photographs.record->Variance(grey);
@@ -75,8 +68,7 @@ class LargeSteps {
     const engine::StepwiseSearch search(experiment, NamedOfRig(fine.search->candidates()),
                                         fine.search->rules(), quiet);
     engine::Parameterization named = selection_.fit.model;
-    for (int e = static_cast<int>(named.base().effects.size()) - 1; e >= 0; --e)
-      if (named.base().effects[e].effect->name == kImageFieldName) named = named.Without(e);
+    if (const int field = IndexOfImageField(named.base()); field >= 0) named = named.Without(field);
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(experiment, named));
     bool any = false;
     for (int step = 0; step < kMaxLargeSteps && left >= kLargeMisfit * noise; ++step) {
@@ -97,6 +89,7 @@ class LargeSteps {
         *fine.experiment, NamedOfRig(fine.search->candidates()), fine.search->rules(), quiet);
     TOUCHSTONE_ASSIGN_OR_RETURN(selection_.initial,
                                 engine::FitModel(*fine.experiment, selection_.initial.model));
+    selection_.found.Add(PhotoHypothesis::kLargeStep);
     selection_.fit = std::move(fit);
     selection_.covariance = CovarianceBetweenBlocks(*fine.experiment, selection_.fit);
     return absl::OkStatus();
@@ -198,6 +191,36 @@ class Rungs {
 absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContext& context,
                            PhotoSelection* selection) {
   return LargeSteps(photographs, context, selection).Run();
+}
+
+absl::Status DropFaintField(PhotoSelection* selection) {
+  const int index = IndexOfImageField(selection->fit.model.base());
+  if (index < 0) return absl::OkStatus();
+  const int side = 64;  // of a coarse picture
+  const std::vector<double>& values = selection->fit.model.base().effects[index].values;
+  const Eigen::VectorXf field =
+      ImageFieldFunctions(side, side) *
+      Eigen::Map<const Eigen::VectorXd>(values.data(), kImageFieldSize).cast<float>();
+  if (field.norm() / side > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+  return absl::OkStatus();
+}
+
+absl::Status DropUnsteady(PhotoSelection* selection) {
+  for (bool dropped = true; dropped;) {
+    dropped = false;
+    selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
+    for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
+         index >= selection->initial_effects && !dropped; --index) {
+      if (engine::NeutralP(selection->fit.model, index, selection->fit.point, selection->covariance) < kStepP)
+        continue;
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
+      dropped = true;
+    }
+  }
+  return absl::OkStatus();
 }
 
 absl::Status HoldChoices(PhotoSelection* selection) {

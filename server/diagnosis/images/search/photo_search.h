@@ -8,6 +8,7 @@
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/fit/fit.h"
 #include "server/diagnosis/engine/nothing_missing.h"
+#include "server/diagnosis/images/photo_hypotheses.h"
 #include "server/diagnosis/images/rows/photo_rows.h"
 #include "server/diagnosis/input.h"
 
@@ -51,6 +52,7 @@ struct PhotoSelection {
   // The explanation fitted to every photograph, contours trusted as what the explanation leaves shows: what its values
   // are taken from.
   engine::Fit polished;
+  engine::Hypotheses found{PhotoHypothesisRules()};
   int initial_effects = 0;
   int field = -1;                           // index of the image field's effect; -1: none
   std::vector<PhotoRung> rungs;             // of the ladder, in the order in which they explain most
@@ -85,6 +87,12 @@ absl::Status PolishExplanation(const Photographs& photographs, const DiagnosisCo
 // and of what lies beside it, take no part from then on.
 absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContext& context,
                            PhotoSelection* selection);
+
+// A field that is small against the noise is what simulation and noise are known to, not dirt: it goes.
+absl::Status DropFaintField(PhotoSelection* selection);
+
+// Steps go whose values the scatter between pictures could make go.
+absl::Status DropUnsteady(PhotoSelection* selection);
 
 // Choices (ParameterInfo::choices), between which fits move freely, become what they are nearest to, and are no longer free;
 // an effect whose value is none of them goes.

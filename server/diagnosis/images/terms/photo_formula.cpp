@@ -69,20 +69,20 @@ class RestSearch {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                                 ExpectPhotographs(photographs_, with, false, pool_));
     RestSuggestion tried;
-    tried.rmse_grey = RmseGrey(photographs_, expected);
-    const double fallen = std::pow(errors_.rmse_grey, 2) - std::pow(tried.rmse_grey, 2);
+    tried.rmse = RmseGrey(photographs_, expected);
+    const double fallen = std::pow(errors_.rmse_grey, 2) - std::pow(tried.rmse, 2);
     const double held = std::min(score.taken_unseen / std::max(score.taken, 1e-300), 1.0);
     const double before2 = std::pow(errors_.heldout_rmse_grey, 2), floor2 = std::pow(errors_.floor_grey, 2);
-    const double after2 = std::max(before2 - fallen * held, std::pow(tried.rmse_grey, 2));
+    const double after2 = std::max(before2 - fallen * held, std::pow(tried.rmse, 2));
     if (!(before2 > floor2)) return none;
-    tried.heldout_rmse_grey = std::sqrt(after2);
+    tried.heldout_rmse = std::sqrt(after2);
     tried.heldout_gain = std::clamp((before2 - after2) / (before2 - floor2), 0.0, 1.0);
     if (tried.heldout_gain < kMinExcess) return none;
     model::Model only = model_;
     const std::string yaml = engine::EffectYaml(only, std::move(instance));
     (effect->formula != nullptr ? tried.formula_yaml : tried.lookup_yaml) = yaml;
     if (effect->formula != nullptr) tried.formula = effect->formula->expression;
-    tried.with = std::move(with);
+    tried.model_with = std::move(with);
     return std::optional<RestSuggestion>(std::move(tried));
   }
 

@@ -7,18 +7,13 @@
 
 #include <absl/status/statusor.h>
 
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/images/photographs.h"
 
 namespace touchstone::diagnosis::images {
 
-struct RestSuggestion {
-  std::string formula, formula_yaml;  // empty: no formula says what the curve says
-  model::Model with;                  // the model with it
-  std::string lookup_yaml;            // empty: none, or the formula stands in its place
-  std::string covariate;              // that it follows
-  double rmse_grey = 0;               // that a comparison with the model and the suggestion finds
-  double heldout_rmse_grey = 0;       // the same of poses that it was not fitted to
-  double heldout_gain = 0;            // share of the held-out excess error that it removes, 0 to 1
+struct RestSuggestion : engine::UnexplainedRest {  // what it says of one, and the errors with it, grey levels
+  std::string covariate;                           // that it follows
 };
 
 struct RestErrors {

@@ -49,7 +49,6 @@ DataReport DataOf(const boards::BoardDiagnosis& found, const boards::BoardSet& s
   }
   if (data.noise_floor && data.initial)
     data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
-  if (!found.rest.empty()) data.unexplained = RestOf(found.rest);
   return data;
 }
 
@@ -57,19 +56,14 @@ DataReport DataOf(const boards::BoardDiagnosis& found, const boards::BoardSet& s
 
 Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet& set) {
   Diagnosis diagnosis;
-  diagnosis.verdict = found.verdict;
   diagnosis.model_name = found.model_name;
   diagnosis.model_hash = found.model_hash;
   diagnosis.data = {DataOf(found, set)};
-  for (const engine::LadderStep& from : found.steps) {
-    Step step{from, {}};
-    step.words = absl::StrCat(ErrorWords(from.quality), step.words.empty() ? "." : "; ", step.words);
-    diagnosis.steps.push_back(std::move(step));
-    diagnosis.data[0].after_step.push_back(from.quality);
-  }
+  AddImprovement(found, &diagnosis);
+  for (Step& step : diagnosis.steps)
+    step.words = absl::StrCat(ErrorWords(step.quality), step.words.empty() ? "." : "; ", step.words);
+  if (!found.rest.empty()) diagnosis.data[0].unexplained = RestOf(found.rest);
   SetNothingMissing(found.nothing_missing, &diagnosis);
-  diagnosis.confounded = found.confounded;
-  diagnosis.improved_model = found.improved_model;
   diagnosis.uncertainty = found.uncertainty;
   diagnosis.summary = found.summary;
   diagnosis.warnings = found.warnings;

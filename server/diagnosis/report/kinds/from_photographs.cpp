@@ -10,22 +10,6 @@
 namespace touchstone::diagnosis::report {
 namespace {
 
-void AddCauses(const images::PhotographDiagnosis& found, Diagnosis* diagnosis) {
-  DataReport& data = diagnosis->data[0];
-  diagnosis->refitted = found.refitted;
-  for (const engine::LadderStep& step : found.steps) {
-    diagnosis->steps.push_back({step, {}});
-    data.after_step.push_back(step.quality);
-  }
-  diagnosis->confounded = found.confounded;
-  diagnosis->superfluous = found.superfluous;
-  data.candidates = found.candidates;
-  data.unexplained = found.unexplained;
-  for (const engine::DataProblem& problem : found.data_problems)
-    diagnosis->data_problems.push_back({problem});
-  diagnosis->improved_model = found.improved_model;
-}
-
 // Pictures by object, from what they have one by one.
 void AddObjectGroups(const images::PhotographDiagnosis& found, DataReport* data) {
   if (found.objects.size() < 2) return;
@@ -103,7 +87,6 @@ DataReport DataOf(const images::PhotographDiagnosis& found, const session::Image
 
 Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const session::ImageSet& set) {
   Diagnosis diagnosis;
-  diagnosis.verdict = found.verdict;
   diagnosis.model_name = found.model_name;
   diagnosis.model_hash = found.model_hash;
   diagnosis.data = {DataOf(found, set)};
@@ -111,10 +94,11 @@ Diagnosis FromPhotographs(const images::PhotographDiagnosis& found, const sessio
   data.noise_floor = found.noise_floor;
   data.initial = found.initial;
   data.final = found.final;
-  data.reducible_share = found.reducible_share;
+  if (data.initial) data.reducible_share = ReducibleShare(found.noise_floor, data.initial->rmse);
   SetNothingMissing(found.nothing_missing, &diagnosis);
   AddWhere(found, set, &data);
-  AddCauses(found, &diagnosis);
+  AddImprovement(found, &diagnosis);
+  for (const engine::DataProblem& problem : found.data_problems) diagnosis.data_problems.push_back({problem});
   diagnosis.uncertainty = found.uncertainty;
   for (const images::ProposedPhotograph& next : found.next_photographs) diagnosis.next.emplace_back(next);
   diagnosis.warnings = found.warnings;

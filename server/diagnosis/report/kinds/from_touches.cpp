@@ -77,22 +77,15 @@ DataProblem InMicroseconds(const engine::DataProblem& from) {
 
 void AddLadder(const selection::Ladder& ladder, Diagnosis* diagnosis) {
   DataReport& data = diagnosis->data[0];
-  diagnosis->verdict = ladder.verdict;
+  AddImprovement(ladder, diagnosis);
   data.noise_floor = InMicroseconds(ladder.noise_floor);
   data.final = InMicroseconds(ladder.final);
   data.set_aside.judged = ladder.set_aside.words;
   data.reducible_share = ReducibleShare(*data.noise_floor, data.initial->rmse);
-  diagnosis->refitted = ladder.refitted;
-  for (const engine::LadderStep& step : ladder.steps) {
-    diagnosis->steps.push_back({step, {}});
-    data.after_step.push_back(InMicroseconds(step.quality));
-  }
-  diagnosis->superfluous = ladder.superfluous;
-  diagnosis->confounded = ladder.confounded;
-  for (const Candidate& candidate : ladder.candidates) data.candidates.push_back(InMicroseconds(candidate));
-  if (ladder.unexplained) data.unexplained = InMicroseconds(*ladder.unexplained);
+  for (Quality& quality : data.after_step) quality = InMicroseconds(quality);
+  for (Candidate& candidate : data.candidates) candidate = InMicroseconds(candidate);
+  if (data.unexplained) data.unexplained = InMicroseconds(*data.unexplained);
   if (!ladder.dropouts.empty()) diagnosis->warnings.push_back(ladder.dropouts);
-  if (ladder.changed) diagnosis->improved_model = ladder.improved;
   diagnosis->posterior = ladder.posterior;
 }
 

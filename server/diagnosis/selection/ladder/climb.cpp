@@ -1,7 +1,6 @@
 #include "server/diagnosis/selection/ladder/climb.h"
 
 #include "server/base/status.h"
-#include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/session/dropouts.h"
@@ -42,10 +41,10 @@ class Climber {
   absl::Status Improve() {
     const touches::Observations& o = *workspace_.observations;
     TOUCHSTONE_ASSIGN_OR_RETURN(climb_.fit, FitAll(workspace_, *climb_.searched));
-    ladder_.improved = climb_.fit.model.base();
-    engine::RoundValues(climb_.fit, &ladder_.improved);
-    ladder_.changed = !climb_.steps.empty();
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<int> superfluous, DescribeGiven());
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        const std::vector<int> superfluous,
+        engine::ImproveValues(workspace_.experiment, *climb_.searched, climb_.fit, climb_.fit.covariance,
+                              *workspace_.input.model, o.objects, &ladder_));
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
     ladder_.residuals = touches::Residuals(o, ladder_.prediction);
     std::vector<double> best = ladder_.residuals;
@@ -66,23 +65,6 @@ class Climber {
     return absl::OkStatus();
   }
 
-  // Values of the given model's effects that were set free: new ones, or zero as far as the data can tell.
-  // Returns the indices of the latter, largest first.
-  absl::StatusOr<std::vector<int>> DescribeGiven() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        engine::GivenEffects given,
-        engine::DescribeGivenEffects(workspace_.experiment, *climb_.searched, climb_.fit,
-                                     climb_.fit.covariance, *workspace_.input.model,
-                                     workspace_.observations->objects));
-    for (const int index : given.superfluous)
-      ladder_.improved.effects.erase(ladder_.improved.effects.begin() + index);
-    ladder_.values_wrong = given.changed();
-    ladder_.changed |= given.changed();
-    ladder_.superfluous = std::move(given.superfluous_names);
-    ladder_.refitted = std::move(given.refitted);
-    return given.superfluous;
-  }
-
   absl::Status DescribeSteps() {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const engine::StepOrder order,
@@ -101,12 +83,8 @@ class Climber {
   }
 
   void AddStep(const engine::OrderedStep& ordered) {
-    engine::LadderStep step = engine::DescribeStep(climb_.fit, climb_.fit.covariance, *ordered.step);
-    engine::AddConfounded(step, &ladder_.confounded);
-    AddOrder(ordered.step->effect, &step);
-    step.model = ModelWith(ordered);
-    step.quality = ordered.quality;
-    ladder_.steps.push_back(std::move(step));
+    AddOrder(ordered.step->effect, &engine::AddStep(climb_.fit, climb_.fit.covariance, *ordered.step,
+                                                    ModelWith(ordered), ordered.quality, &ladder_));
   }
 
   // Objects have sizes and places of their own; what belongs to the rig and differs between objects may differ in time.

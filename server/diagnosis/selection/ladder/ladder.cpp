@@ -56,59 +56,82 @@ class LadderBuilder {
         observations_(*workspace.observations) {}
 
   absl::StatusOr<Ladder> Build() {
-    AddOfSelection();
-    DoubtSteps();
-    AskRounds();
-    AskTicks();
     TOUCHSTONE_RETURN_IF_ERROR(SetFinal());
-    TOUCHSTONE_RETURN_IF_ERROR(AskSurface());
-    NoiseQuestions noise(observations_, selection_, &found_, &ladder_);
-    noise.AskPoseScatter();
-    if (found_.Allows(Question::kMisfit) && engine::StructureRemains(left_, ladder_.noise_floor.sigma))
-      found_.Add(Hypothesis::kMisfit);
-    noise.AddSteps(rounds_.p);
+    if (selection_.memory) AddMemoryStep(*selection_.memory, observations_, &ladder_);
+    TOUCHSTONE_RETURN_IF_ERROR(found_.Ask(Questions()));
     TOUCHSTONE_ASSIGN_OR_RETURN(
         ladder_.candidates,
         engine::RankCandidates(*selection_.search, selection_.initial_model, selection_.initial_effects,
                                [this](const engine::Fit& fit, engine::RankedCandidate* candidate) {
                                  return SetErrors(workspace_, fit, candidate);
                                }));
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeRest());
-    ladder_.verdict = found_.Leave(Leaves::kScatter) ? engine::Verdict::kUnexplained
-                      : !ladder_.steps.empty()       ? engine::Verdict::kMissingEffects
-                      : ladder_.values_wrong         ? engine::Verdict::kWrongValues
-                                                     : engine::Verdict::kAdequate;
-    if (ladder_.changed && !ladder_.improved.name.empty()) ladder_.improved.name += "_better";
+    if (found_.Leave(engine::Leaves::kBeside)) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
+                                  DescribeUnexplained(workspace_, selection_, ladder_.final,
+                                                      ladder_.noise_floor.sigma, climb_.with_formula));
+      found_.DescribeRest(&*ladder_.unexplained);
+    }
+    engine::Conclude(found_, ExplainedShare(), &ladder_);
     TOUCHSTONE_RETURN_IF_ERROR(AddPosterior());
     return std::move(ladder_);
   }
 
  private:
-  using NameFirst = Hypotheses::NameFirst;
+  using H = Hypothesis;
 
-  // What competed with the effects of the catalogue.
-  void AddOfSelection() {
-    const NameFirst name_time = [this](engine::UnexplainedRest* rest) {
+  engine::Hypotheses::Questions Questions() {
+    const auto name_time = [this](engine::UnexplainedRest* rest) {
       NameTimeFirst(observations_, ladder_.noise_floor, rest);
     };
-    if (selection_.memory && IsRandomWalk())
-      found_.Add(
-          Hypothesis::kRandomWalk,
-          "The fingers drift through the whole session, and nothing shows that they revert to a mean: a "
-          "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
-          "session.",
-          name_time);
-    else if (selection_.memory)
-      found_.Add(Hypothesis::kCorrelatedNoise);
-    if (found_.Allows(Question::kCourse) && SharesTime(ladder_.noise_floor))
-      found_.Add(Hypothesis::kCourse, "", name_time);
-    if (selection_.group)
-      found_.Add(Hypothesis::kGroup, selection_.group->words, [this](engine::UnexplainedRest* rest) {
-        rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
-      });
-    if (selection_.partial) found_.Add(Hypothesis::kPartialOffset, selection_.partial->words);
-    if (selection_.formula >= 0) found_.Add(Hypothesis::kFormula);
-    if (selection_.curve) found_.Add(Hypothesis::kCurve, CourseInWords(selection_.curve->words));
+    const auto ask = [](auto question) {
+      return [question] {
+        question();
+        return absl::OkStatus();
+      };
+    };
+    return {
+        {H::kRandomWalk,
+         [=] {
+           return found_.AddIf(
+               selection_.memory && IsRandomWalk(), H::kRandomWalk,
+               "The fingers drift through the whole session, and nothing shows that they revert to a mean: a "
+               "walk, or noise whose memory is as long as the session. Find what moves, or make a longer "
+               "session.",
+               name_time);
+         }},
+        {H::kCorrelatedNoise,
+         [this] { return found_.AddIf(selection_.memory.has_value(), H::kCorrelatedNoise); }},
+        {H::kCourse,
+         [=] { return found_.AddIf(SharesTime(ladder_.noise_floor), H::kCourse, "", name_time); }},
+        {H::kGroup, ask([this] {
+           if (selection_.group)
+             found_.Add(H::kGroup, selection_.group->words, [this](engine::UnexplainedRest* rest) {
+               rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
+             });
+         })},
+        {H::kPartialOffset, ask([this] {
+           if (selection_.partial) found_.Add(H::kPartialOffset, selection_.partial->words);
+         })},
+        {H::kFormula, [this] { return found_.AddIf(selection_.formula >= 0, H::kFormula); }},
+        {H::kCurve, ask([this] {
+           if (selection_.curve) found_.Add(H::kCurve, CourseInWords(selection_.curve->words));
+         })},
+        {H::kStrangeValues, ask([this] { AskStrangeValues(); })},
+        {H::kRemounted, ask([this] { AskRounds(); })},
+        {H::kTicks, ask([this] { AskTicks(); })},
+        {H::kSetAside, ask([this] { AskSetAside(); })},
+        {H::kUnplaced, [this] { return AskSurface(); }},
+        {H::kPlay, ask([this] { noise_.AskPlay(); })},
+        {H::kMisfit,
+         [this] {
+           return found_.AddIf(engine::StructureRemains(left_, ladder_.noise_floor.sigma), H::kMisfit);
+         }},
+        {H::kUnevenScatter, ask([this] { noise_.AskUnevenScatter(); })},
+        {H::kRandomDelay, ask([this] { noise_.AskRandomDelay(); })},
+        {H::kLopsided, ask([this] { noise_.AskLopsided(); })},
+        {H::kNoise, ask([this] { noise_.AddSteps(rounds_.p); })},
+        {H::kAbsentMemory, ask([this] { RemoveAbsentMemory(observations_, &ladder_); })},
+    };
   }
 
   // A drift of which the session does not show that it reverts to its mean is no noise of a known memory, unless the given
@@ -123,19 +146,18 @@ class LadderBuilder {
     return absl::StrCat(words, ".");
   }
 
-  void DoubtSteps() {
+  void AskStrangeValues() {
     DoubtUnusualValues(climb_.fit, climb_.steps, &ladder_);
     DoubtTwoSpeeds(workspace_, *climb_.searched, climb_.steps, &ladder_);
     std::string strange = StrangeValuesInWords(climb_.fit, climb_.steps, &ladder_);
-    if (!strange.empty()) found_.Add(Hypothesis::kStrangeValues, std::move(strange));
+    if (!strange.empty()) found_.Add(H::kStrangeValues, std::move(strange));
   }
 
   void AskRounds() {
-    if (!found_.Allows(Question::kRounds)) return;
     const double sigma_s = ladder_.noise_floor.sigma;
     rounds_ = FindRoundStructure(observations_, ladder_.prediction, ladder_.residuals);
     if (SharesRounds(rounds_, sigma_s))
-      found_.Add(Hypothesis::kRemounted, RoundsInWords(rounds_, sigma_s),
+      found_.Add(H::kRemounted, RoundsInWords(rounds_, sigma_s),
                  [this](engine::UnexplainedRest* rest) { NameRoundFirst(rounds_, rest); });
   }
 
@@ -149,22 +171,21 @@ class LadderBuilder {
                         ticks.touches, ticks.compared, TimeInWords(ticks.interval_s)));
   }
 
-  // The errors of the improved model. New values that compare worse are none.
+  // The errors of the improved model.
   absl::Status SetFinal() {
     TOUCHSTONE_ASSIGN_OR_RETURN(left_, QualityOf(workspace_, *climb_.searched, ladder_.residuals));
     ladder_.final = left_;
     TOUCHSTONE_ASSIGN_OR_RETURN(const double final_s, ErrorAsCompared(workspace_, ladder_.improved));
     SetError(final_s, &ladder_.final);
-    if (ladder_.steps.empty() && ladder_.values_wrong && ladder_.final.rmse > climb_.before.rmse) {
-      ladder_.improved = *workspace_.input.model;
+    if (engine::KeepGivenIfWorse(*workspace_.input.model, climb_.before, ladder_.final, &ladder_))
       ladder_.final = climb_.before;
-      ladder_.refitted.clear(), ladder_.superfluous.clear();
-      ladder_.values_wrong = ladder_.changed = false;
-    }
+    return absl::OkStatus();
+  }
+
+  void AskSetAside() {
     ladder_.set_aside = AssessTouchesSetAside(observations_, ladder_.residuals, ladder_.final.rmse,
                                               ladder_.noise_floor.sigma);
-    if (ladder_.set_aside.is_finding) found_.Add(Hypothesis::kSetAside, ladder_.set_aside.words);
-    return absl::OkStatus();
+    if (ladder_.set_aside.is_finding) found_.Add(H::kSetAside, ladder_.set_aside.words);
   }
 
   const model::EffectInstance* GivenSurface() const {
@@ -175,7 +196,7 @@ class LadderBuilder {
 
   // Bumps of the surface may be the last step, where nothing else accounts for them.
   absl::Status AskSurface() {
-    if (selection_.fit.hypothesis == 0 || !found_.Allows(Question::kSurface)) return absl::OkStatus();
+    if (selection_.fit.hypothesis == 0) return absl::OkStatus();
     const double gain_nats = selection_.surface_error.gain_nats;
     const bool misfit = left_.lack_of_fit_p < kMisfitP;
     if (!(gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit))) return absl::OkStatus();
@@ -193,21 +214,7 @@ class LadderBuilder {
       RefitSurfaceError(selection_.surface_error, &ladder_);
       return absl::OkStatus();
     }
-    if (gain_nats > kSurfaceNats && support.IsElsewhere())
-      found_.Add(Hypothesis::kUnplaced, support.WordsOfRest());
-    return absl::OkStatus();
-  }
-
-  absl::Status DescribeRest() {
-    if (!found_.Leave(Leaves::kScatter)) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
-                                DescribeUnexplained(workspace_, selection_, ladder_.final,
-                                                    ladder_.noise_floor.sigma, climb_.with_formula));
-    found_.NameCovariates(&*ladder_.unexplained);
-    ladder_.unexplained->words = found_.Words();
-    if (found_.Leave(Leaves::kMeans))
-      engine::DoubtBesideRest(engine::MostBesideRest(ExplainedShare(), found_.Leave(Leaves::kDoubts)),
-                              &ladder_.steps, &ladder_.candidates);
+    if (gain_nats > kSurfaceNats && support.IsElsewhere()) found_.Add(H::kUnplaced, support.WordsOfRest());
     return absl::OkStatus();
   }
 
@@ -233,9 +240,10 @@ class LadderBuilder {
   Climb climb_;
   Ladder& ladder_;  // the climb's
   const touches::Observations& observations_;
-  Hypotheses found_;
+  engine::Hypotheses found_{HypothesisRules()};
   engine::Quality left_;  // on the touches that the fits used: what the verdict is about
   RoundStructure rounds_;
+  NoiseQuestions noise_{observations_, selection_, &found_, &ladder_};
 };
 
 }  // namespace

@@ -13,23 +13,12 @@
 
 namespace touchstone::diagnosis::selection {
 
-struct Ladder {
-  engine::Verdict verdict = engine::Verdict::kNone;
+struct Ladder : engine::Improvement {
   engine::NoiseFloor noise_floor;
-  std::vector<engine::RefittedEffect> refitted;
-  std::vector<engine::LadderStep> steps;  // in the order in which they explain most
-  std::vector<std::string> superfluous;   // effects of the initial model that the data do without
-  std::string dropouts;   // where contacts are missed, for people; empty: nowhere in particular
-  engine::Quality final;  // after all steps and refits
-  std::vector<engine::ConfoundedEffects> confounded;
-  std::vector<engine::RankedCandidate> candidates;  // best first
-  std::optional<engine::UnexplainedRest> unexplained;
-  engine::SetAside set_aside;  // outliers
-
-  model::Model improved;             // the initial model with steps and refits, without a formula
-  bool changed = false;              // improved differs from the initial model
+  std::string dropouts;              // where contacts are missed, for people; empty: nowhere in particular
+  engine::Quality final;             // after all steps and refits
+  engine::SetAside set_aside;        // outliers
   bool surface_as_given = false;     // the model says that surfaces are as wrong as they are
-  bool values_wrong = false;         // an effect of the initial model, other than noise, has other values
   std::vector<double> residuals;     // of the improved model, all touches, s
   touches::Prediction prediction;    // of the improved model, with details
   uncertainty::Posterior posterior;  // of the improved model

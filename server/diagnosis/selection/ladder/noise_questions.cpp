@@ -25,69 +25,75 @@ void DoubtStep(const std::string& words, engine::LadderStep* step) {
 }  // namespace
 
 NoiseQuestions::NoiseQuestions(const touches::Observations& observations, const SelectionResult& selection,
-                               Hypotheses* found, Ladder* ladder)
-    : observations_(observations), selection_(selection), found_(found), ladder_(ladder) {}
+                               engine::Hypotheses* found, Ladder* ladder)
+    : observations_(observations),
+      selection_(selection),
+      found_(found),
+      ladder_(ladder),
+      noise_(selection.noise) {}
 
-void NoiseQuestions::AskPoseScatter() {
-  if (selection_.memory) AddMemoryStep(*selection_.memory, observations_, ladder_);
-  first_of_noise_ = ladder_->steps.size();
-  if (!found_->Allows(Question::kPoseScatter)) return;
+void NoiseQuestions::AskPlay() {
   pose_scatter_ = FindPoseScatter(observations_, ladder_->prediction, ladder_->residuals, selection_.noise);
   if (pose_scatter_ && pose_scatter_->ahead) found_->Add(Hypothesis::kPlay, pose_scatter_->words);
 }
 
-void NoiseQuestions::AddSteps(double rounds_p) {
-  if (found_->Allows(Question::kNoise) && !ladder_->noise_floor.is_rounding) {
-    touches::NoiseFindings noise = selection_.noise;
-    AskUnevenScatter(&noise);
-    AddNoiseSteps(std::move(noise), selection_.memory.has_value(), ladder_);
-  }
-  DoubtSteps(rounds_p);
-  if (found_->Allows(Question::kAbsentMemory)) RemoveAbsentMemory(observations_, ladder_);
+// Not of what a misfit makes, and not of ticks.
+bool NoiseQuestions::ScatterHasAShape() const {
+  return !ladder_->noise_floor.is_rounding && !(selection_.noise.poll_interval_s.gain_nats > 0) &&
+         !found_->Leave(engine::Leaves::kMeans) && selection_.fit.hypothesis == 0;
+}
+
+touches::NoiseSample NoiseQuestions::Sample() const {
+  return touches::MakeNoiseSample(observations_, ladder_->residuals, ladder_->prediction);
 }
 
 // Where something else makes touches scatter, parts of the set scatter differently for that reason; repeats know nothing
 // of a misfit.
-void NoiseQuestions::AskUnevenScatter(touches::NoiseFindings* noise) {
+void NoiseQuestions::AskUnevenScatter() {
   const bool misfit = found_->Has(Hypothesis::kFormula) || found_->Has(Hypothesis::kMisfit) ||
-                      found_->Has(Hypothesis::kUnplaced) || found_->Leave(Leaves::kDoubts) ||
+                      found_->Has(Hypothesis::kUnplaced) || found_->Leave(engine::Leaves::kDoubts) ||
                       selection_.fit.hypothesis != 0;
-  if (!found_->Allows(Question::kUnevenScatter) || (!ladder_->noise_floor.from_repeats && misfit)) return;
-  const touches::NoiseSample sample =
-      touches::MakeNoiseSample(observations_, ladder_->residuals, ladder_->prediction);
+  if (ladder_->noise_floor.is_rounding || (!ladder_->noise_floor.from_repeats && misfit)) return;
   std::optional<UnevenScatter> uneven =
-      FindUnevenScatter(observations_, ladder_->prediction, sample, selection_.noise);
-  if (!uneven) return AskShapeOfScatter(sample, noise);
-  if (!uneven->tails_remain) noise->degrees_of_freedom = {};
-  if (uneven->finger >= 0) noise->channel_sigma_s.clear();
+      FindUnevenScatter(observations_, ladder_->prediction, Sample(), selection_.noise);
+  if (!uneven) return;
+  if (!uneven->tails_remain) noise_.degrees_of_freedom = {};
+  if (uneven->finger >= 0) noise_.channel_sigma_s.clear();
   found_->Add(Hypothesis::kUnevenScatter, uneven->words,
               [scatter = *uneven, found = found_](engine::UnexplainedRest* rest) {
-                NameUnevenScatter(scatter, found->Leave(Leaves::kMeans), rest);
+                NameUnevenScatter(scatter, found->Leave(engine::Leaves::kMeans), rest);
               });
 }
 
-// What comes late now and then looks like more noise, or heavy-tailed. A misfit does by itself.
-void NoiseQuestions::AskShapeOfScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise) {
-  if (selection_.noise.poll_interval_s.gain_nats > 0 || found_->Leave(Leaves::kMeans) ||
-      selection_.fit.hypothesis != 0)
-    return;
-  delay_ = FindRandomDelay(sample, selection_.noise, observations_.fingers);
-  if (delay_ && delay_->ahead) {
-    found_->Add(Hypothesis::kRandomDelay, delay_->words);
-    *noise = WithoutDelays(*delay_, std::move(*noise));
-    return;
-  }
-  const auto lopsided = FindLopsidedScatter(sample.groups, observations_.fingers);
+// What comes late now and then looks like more noise, or heavy-tailed.
+void NoiseQuestions::AskRandomDelay() {
+  if (!ScatterHasAShape()) return;
+  delay_ = FindRandomDelay(Sample(), selection_.noise, observations_.fingers);
+  if (!delay_ || !delay_->ahead) return;
+  found_->Add(Hypothesis::kRandomDelay, delay_->words);
+  noise_ = WithoutDelays(*delay_, std::move(noise_));
+}
+
+void NoiseQuestions::AskLopsided() {
+  if (!ScatterHasAShape()) return;
+  const auto lopsided = FindLopsidedScatter(Sample().groups, observations_.fingers);
   if (!lopsided) return;
   found_->Add(Hypothesis::kLopsided, lopsided->words);
-  noise->degrees_of_freedom = {};
+  noise_.degrees_of_freedom = {};
+}
+
+void NoiseQuestions::AddSteps(double rounds_p) {
+  const size_t first = ladder_->steps.size();
+  if (ladder_->noise_floor.is_rounding) return;
+  AddNoiseSteps(noise_, selection_.memory.has_value(), ladder_);
+  DoubtSteps(first, rounds_p);
 }
 
 // Of the steps of noise, what an object that moves, or a random delay, would look like.
-void NoiseQuestions::DoubtSteps(double rounds_p) {
+void NoiseQuestions::DoubtSteps(size_t first, double rounds_p) {
   const std::string level = effects::FindByRole(model::EffectRole::kNoiseLevel)->name;
   const std::string tails = effects::FindByRole(model::EffectRole::kNoiseTails)->name;
-  for (size_t j = first_of_noise_; j < ladder_->steps.size(); ++j) {
+  for (size_t j = first; j < ladder_->steps.size(); ++j) {
     engine::LadderStep* step = &ladder_->steps[j];
     if (rounds_p < kRoundsPossibleP)
       DoubtStep("Repeats agree within rounds: an object put down anew each round would look alike.", step);

@@ -14,23 +14,26 @@ class NoiseQuestions {
  public:
   // All must outlive it.
   NoiseQuestions(const touches::Observations& observations, const SelectionResult& selection,
-                 Hypotheses* found, Ladder* ladder);
+                 engine::Hypotheses* found, Ladder* ladder);
 
-  // Adds the step of correlated noise, and asks whether repeats scatter as if something moved.
-  void AskPoseScatter();
-  // Asks the other questions and adds the steps of noise. `rounds_p`: of the agreement of repeats within rounds.
+  // By the hypotheses of their names.
+  void AskPlay();
+  void AskUnevenScatter();
+  void AskRandomDelay();
+  void AskLopsided();
+  // Adds the steps of noise. `rounds_p`: of the agreement of repeats within rounds.
   void AddSteps(double rounds_p);
 
  private:
-  void AskUnevenScatter(touches::NoiseFindings* noise);
-  void AskShapeOfScatter(const touches::NoiseSample& sample, touches::NoiseFindings* noise);
-  void DoubtSteps(double rounds_p);
+  bool ScatterHasAShape() const;
+  touches::NoiseSample Sample() const;
+  void DoubtSteps(size_t first, double rounds_p);
 
   const touches::Observations& observations_;
   const SelectionResult& selection_;
-  Hypotheses* found_;
+  engine::Hypotheses* found_;
   Ladder* ladder_;
-  size_t first_of_noise_ = 0;  // step
+  touches::NoiseFindings noise_;  // the selection's, without what other hypotheses explain
   std::optional<PoseScatter> pose_scatter_;
   std::optional<RandomDelay> delay_;
 };

@@ -143,23 +143,12 @@ class NoiseStepWriter {
 
   void Add(const std::shared_ptr<const model::Effect>& effect, const engine::ParameterEstimate& estimate,
            double gain_nats) {
-    engine::LadderStep step;
-    step.effect = effect->name;
-    step.meaning = effect->meaning;
-    step.check_on_rig = effect->check_on_rig;
-    step.remedy = effect->remedy;
+    std::vector<double> values = effect->NeutralValues(ladder_.improved.fingers);
+    values[0] = RoundedValue(effect->parameters[0], estimate);
+    engine::LadderStep& step = engine::AddNoiseStep(
+        effect, std::move(values), {estimate}, engine::ProbabilityOf(gain_nats), ladder_.final, &ladder_);
     step.gain_nats = gain_nats;
-    step.probability = engine::ProbabilityOf(gain_nats);
-    step.parameters = {estimate};
-    step.quality = ladder_.final;  // noise changes no expectation: the errors stay
     if (effect->role == model::EffectRole::kDropout) step.words = std::exchange(ladder_.dropouts, "");
-    ladder_.steps.push_back(std::move(step));
-    model::EffectInstance instance;
-    instance.effect = effect;
-    instance.values = effect->NeutralValues(ladder_.improved.fingers);
-    instance.values[0] = RoundedValue(effect->parameters[0], estimate);
-    ladder_.improved.effects.push_back(std::move(instance));
-    ladder_.changed = true;
   }
 
   Ladder& ladder_;

@@ -82,9 +82,7 @@ absl::Status DescribeFormula(const Workspace& workspace, const SelectionResult& 
                               QualityOfModel(workspace, fit, *rest->model_with));
   rest->rmse = quality.rmse;
   rest->heldout_rmse = quality.heldout_rmse;
-  const double before = std::pow(final.heldout_rmse, 2) - floor_s * floor_s;
-  const double after = std::pow(quality.heldout_rmse, 2) - floor_s * floor_s;
-  rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+  rest->heldout_gain = engine::ExplainedShare(final.heldout_rmse, quality.heldout_rmse, floor_s);
   return absl::OkStatus();
 }
 
@@ -97,9 +95,7 @@ absl::Status DescribeCurve(const Workspace& workspace, const SelectionResult& se
                                      std::max<double>(1, selection.fit.columns.values.rows()));
   const double ratio = in_sample > 0 ? std::max(1.0, curve.heldout_with_s / in_sample) : 1;
   rest->heldout_rmse = rest->rmse * ratio;
-  const double before = std::pow(final.rmse, 2) - floor_s * floor_s;
-  const double after = std::pow(rest->heldout_rmse, 2) - floor_s * floor_s;
-  rest->heldout_gain = before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+  rest->heldout_gain = engine::ExplainedShare(final.rmse, rest->heldout_rmse, floor_s);
   return absl::OkStatus();
 }
 
