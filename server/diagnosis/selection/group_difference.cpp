@@ -91,17 +91,13 @@ class DifferenceSearch {
     return 0.5 * repeats_.degrees() * std::log(before / after) - 0.5 * values * std::log(repeats_.degrees());
   }
 
-  // Of what repeats differ by under the given model, what a fit takes off. A value is paid for by the share of its column that
-  // differs within poses: the degrees of freedom that it takes there. What is the same in every touch of a pose fixes the rest
-  // of it; beside an effect of the touch before, every value of a pose differs a little within poses.
+  // Of what repeats differ by under the given model, what a fit takes off. Beside an effect of the touch before, every value of a
+  // pose differs a little within poses.
   double NatsOf(const engine::Fit& fit) const {
-    const Eigen::MatrixXd centred = repeats_.Centred(fit.columns.values);
-    double values = 0;
-    for (Eigen::Index i = 1; i < centred.cols(); ++i)
-      if (const double whole = fit.columns.values.col(i).squaredNorm(); whole > 0)
-        values += centred.col(i).squaredNorm() / whole;
+    const Eigen::MatrixXd& columns = fit.columns.values;
     return Nats(repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm(),
-                std::max(centred.col(0).squaredNorm(), kMinSumOfSquares), values);
+                std::max(repeats_.Centred(columns.col(0)).squaredNorm(), kMinSumOfSquares),
+                repeats_.DegreesTaken(columns.rightCols(columns.cols() - 1)));
   }
 
   // Of the whole explanation. Against rounds, which are known beforehand, a curve pays for each of its knots; against a stretch

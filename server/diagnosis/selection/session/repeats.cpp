@@ -34,6 +34,15 @@ Eigen::MatrixXd Repeats::Centred(const Eigen::MatrixXd& rows) const {
   return centred;
 }
 
+double Repeats::DegreesTaken(const Eigen::MatrixXd& columns) const {
+  const Eigen::MatrixXd centred = Centred(columns);
+  double taken = 0;
+  for (Eigen::Index i = 0; i < columns.cols(); ++i)
+    if (const double squares = columns.col(i).squaredNorm(); squares > 0)
+      taken += centred.col(i).squaredNorm() / squares;
+  return taken;
+}
+
 Eigen::MatrixXd Repeats::Only(const Eigen::MatrixXd& rows, const std::vector<char>& has) const {
   Eigen::MatrixXd only = Eigen::MatrixXd::Zero(rows.rows(), rows.cols());
   for (int t = 0; t < static_cast<int>(has.size()); ++t)

@@ -20,6 +20,9 @@ class Repeats {
 
   // `rows`: contrast rows x columns. Rows without repeats are 0.
   Eigen::MatrixXd Centred(const Eigen::MatrixXd& rows) const;
+  // Degrees of freedom that values with these derivatives (contrast rows x columns) take of the repeats, 0 to 1 each: the share of
+  // a column's squares that differs within poses. What is the same in every touch of a pose fixes the rest of a value.
+  double DegreesTaken(const Eigen::MatrixXd& columns) const;
   // The rows of touches that `has` names, by index into the contrasts' touches; 0 elsewhere.
   Eigen::MatrixXd Only(const Eigen::MatrixXd& rows, const std::vector<char>& has) const;
   // With the touches of each pose in another order.
