@@ -211,6 +211,15 @@ TEST(BoardDiagnosis, GivesTheLensInPixels) {
   EXPECT_NEAR(lens.camera.cy_px, real.cy_px, 4 * lens.cy_error_px);
   EXPECT_NEAR(lens.camera.k1, real.k1, 0.02);
   EXPECT_THAT(diagnosis.summary, HasSubstr("The lens: fx "));
+  int centres = 0;
+  for (const engine::LadderStep& step : diagnosis.steps)
+    for (const engine::ParameterEstimate& value : step.parameters) {
+      if (step.effect != "principal_point") continue;
+      EXPECT_EQ(value.std_error, value.entry == "x" ? lens.cx_error_px : lens.cy_error_px);
+      ++centres;
+    }
+  EXPECT_EQ(centres, 2);
+  EXPECT_NE(lens.cx_error_px, lens.cy_error_px);
 }
 
 }  // namespace
