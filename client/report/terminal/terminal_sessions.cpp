@@ -91,7 +91,9 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
   const auto column = [&](double at) {
     return std::clamp(static_cast<int>(std::lround((at - low) / (high - low) * (kChart - 1))), 0, kChart - 1);
   };
-  out->Label(value.between_sessions() > 0 ? "Scatters" : "Steady");
+  out->Label(value.change() == v1::ComparedEffect::CHANGED     ? "Changed"
+             : value.change() == v1::ComparedEffect::UNCHANGED ? "Unchanged"
+                                                               : "Cannot say");
   out->Paragraph(
       absl::StrCat(NameOfValue(effect, value), ", ", value.unit(),
                    value.between_sessions() > 0
