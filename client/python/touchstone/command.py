@@ -22,6 +22,7 @@ from typing import Any, NoReturn
 
 from .errors import InvalidRequest, NotFound, SourceUnreachable, TouchstoneError
 from .printable import printable
+from .spoken import as_command
 
 # As client/cli/common/exit_code.h.
 BAD_INPUT, UNREACHABLE, REFUSED, INTERRUPTED = 2, 3, 4, 130
@@ -140,7 +141,7 @@ def log(quiet: bool, line: str) -> None:
 
 def _complain(message: str) -> None:
     sys.stdout.flush()
-    print(f"touchstone: error: {printable(message)}", file=sys.stderr)
+    print(f"touchstone: error: {printable(as_command(message))}", file=sys.stderr)
 
 
 def run(main: Callable[[list[str]], None]) -> NoReturn:

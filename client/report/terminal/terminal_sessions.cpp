@@ -9,6 +9,7 @@
 #include "client/report/terminal/terminal_parts.h"
 #include "client/report/words/error_scale.h"
 #include "client/report/words/words.h"
+#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {
@@ -17,18 +18,11 @@ using TextCell = TextLayout::Cell;
 
 constexpr int kMaxColumns = 3;  // sessions beside one another; of more, the two that differ most
 
-// Digits that the error leaves.
-std::string ValueWithError(double value, double std_error) {
-  if (!(std_error > 0)) return Number(value, 3);
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std_error))), 0, 9);
-  return absl::StrFormat("%.*f +- %.*f", decimals, value, decimals, std_error);
-}
-
 std::string ChangeInWords(const v1::ComparedValue& value, double p) {
   switch (value.change()) {
     case v1::ComparedEffect::CHANGED:
       return absl::StrCat("changed by ", value.difference() > 0 ? "+" : "",
-                          ValueWithError(value.difference(), value.std_error()), " ", value.unit(), " (p ",
+                          touchstone::ValueWithError(value.difference(), value.std_error()), " ", value.unit(), " (p ",
                           Probability(p), ")");
     case v1::ComparedEffect::UNCHANGED:
       return absl::StrCat("unchanged, within ",
@@ -57,7 +51,7 @@ std::string InSession(const v1::ComparedValue& value, int session) {
   const v1::SessionValue* one = OfSession(value, session);
   return one == nullptr
              ? "-"
-             : absl::StrCat(ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
+             : absl::StrCat(touchstone::ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
 }
 
 void AddErrors(const v1::Report& report, TextLayout* out) {
@@ -109,7 +103,7 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
     }
     chart[column(one.value())] = one.outside() ? 'X' : 'o';
     rows.push_back({{SessionLabel(report, static_cast<int>(one.session()))},
-                    {ValueWithError(one.value(), one.std_error()), true},
+                    {touchstone::ValueWithError(one.value(), one.std_error()), true},
                     {chart, false, one.outside() ? TextLayout::kBad : TextLayout::kBar},
                     {one.outside() ? "outside" : ""}});
   }

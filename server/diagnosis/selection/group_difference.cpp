@@ -13,6 +13,7 @@
 #include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/text/readable_time.h"
+#include "server/base/text/value_text.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/session/repeats.h"
 #include "server/diagnosis/selection/session/round_structure.h"
@@ -310,8 +311,7 @@ class DifferenceSearch {
       if (std::abs(value.value) > kClearErrors * value.std_error)
         values.push_back(
             absl::StrCat(value.name, value.entry.empty() ? "" : " ", value.entry,
-                         absl::StrFormat(value.std_error < 10 ? " %+.4g +- %.1g" : " %+.0f +- %.0f",
-                                         value.value, value.std_error),
+                         value.value > 0 ? " +" : " ", ValueWithError(value.value, value.std_error),
                          value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
     std::string words =

@@ -6,6 +6,7 @@
 #include <absl/strings/str_join.h>
 
 #include "server/base/files/file_label.h"
+#include "server/base/text/value_text.h"
 #include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis::report {
@@ -37,8 +38,8 @@ std::string CourseInWords(const Sessions& sessions, const std::vector<DataReport
     std::vector<std::string> names;
     for (const int session : run.sessions) names.push_back(SessionName(data, sessions.taking_part[session]));
     const size_t count = names.size();
-    parts.push_back(absl::StrFormat(
-        "%.4g +- %.2g %s in %s", run.mean.value, run.mean.std_error, named.unit,
+    parts.push_back(absl::StrCat(
+        ValueWithError(run.mean.value, run.mean.std_error), " ", named.unit, " in ",
         count > kMaxNames ? absl::StrCat(names.front(), " to ", names.back()) : absl::StrJoin(names, " and ")));
   }
   return absl::StrCat(ValueName(effect, named), " from ", absl::StrJoin(parts, " to "),
