@@ -23,8 +23,9 @@ absl::Status MissingMesh(absl::string_view place, const std::vector<std::string>
                          absl::StrJoin(missing.begin() + 1,
                                        missing.begin() + std::min(missing.size(), kMaxNamed), ", "),
                          missing.size() > kMaxNamed ? ", ..." : "", ")");
-  return absl::NotFoundError(absl::StrCat(place, "'", missing[0], "' has no mesh", others, "; give it with --mesh ",
-                                          missing[0], "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
+  return absl::NotFoundError(absl::StrCat(place, "'", missing[0], "' has no mesh", others,
+                                          "; give it with --mesh ", missing[0], "=FILE or --mesh-dir FOLDER",
+                                          DidYouMean(missing[0], known)));
 }
 
 }  // namespace touchstone::geometry

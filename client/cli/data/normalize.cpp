@@ -73,8 +73,8 @@ class NormalizeRun {
     if (!status.ok()) {
       std::error_code stays;  // a hidden folder, if the disk fails at that too
       fs::remove_all(unfinished_, stays);
-      return absl::Status(status.code(), absl::StrReplaceAll(status.message(),
-                                                             {{unfinished_.string(), options_.output}}));
+      return absl::Status(status.code(),
+                          absl::StrReplaceAll(status.message(), {{unfinished_.string(), options_.output}}));
     }
     if (cli_.output().json)
       PrintJson({{"folder", options_.output},

@@ -184,7 +184,7 @@ class Photos {
     }
     if (left_out_ > 0)
       cli_.Warn(absl::StrCat(table.Text(), "\n", left_out_, " of ", Counted(views_.size(), "view", "views"),
-                            left_out_ == 1 ? " is" : " are", " left out; nothing has moved yet"));
+                             left_out_ == 1 ? " is" : " are", " left out; nothing has moved yet"));
     return absl::OkStatus();
   }
 

@@ -29,9 +29,9 @@ void AddSessionPlace(Cli* cli, CLI::App* command, SessionPlace* place, const std
                      bool has_default) {
   cli->AddInput(command, command->add_option("NAME", place->name, what)->type_name("")->required());
   command
-      ->add_option("SESSION", place->in_journal,
-                   absl::StrCat("The session's name in that journal",
-                                has_default ? ". Default: its only one" : ""))
+      ->add_option(
+          "SESSION", place->in_journal,
+          absl::StrCat("The session's name in that journal", has_default ? ". Default: its only one" : ""))
       ->type_name("");
 }
 
@@ -50,12 +50,13 @@ absl::StatusOr<session::JournalSession> FindSession(const session::Journal& jour
   std::string list;
   for (const std::string& known : names) absl::StrAppend(&list, list.empty() ? "" : ", ", known);
   if (!naming.empty())
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, ": the journal has ", names.size(), " sessions (", list, "); say which: ",
-                     absl::StrReplaceAll(naming, {{"FILE", path}, {"NAME", names.front()}})));
-  return absl::InvalidArgumentError(absl::StrCat(path, ": the journal has ", names.size(), " sessions (",
-                                                 list, "); write the one that is meant to a file: touchstone session export ",
-                                                 path, " ", names.front(), " -o ", names.front(), ".csv"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, ": the journal has ", names.size(), " sessions (", list,
+        "); say which: ", absl::StrReplaceAll(naming, {{"FILE", path}, {"NAME", names.front()}})));
+  return absl::InvalidArgumentError(
+      absl::StrCat(path, ": the journal has ", names.size(), " sessions (", list,
+                   "); write the one that is meant to a file: touchstone session export ", path, " ",
+                   names.front(), " -o ", names.front(), ".csv"));
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,
@@ -102,7 +103,8 @@ absl::StatusOr<std::string> CsvOf(const session::Journal& journal, const std::st
 
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session, kExportOne));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found,
+                              FindSession(*journal, path, session, kExportOne));
   return CsvOf(*journal, path, found.name);
 }
 
@@ -111,7 +113,8 @@ absl::Status ExportFromJournal(const Cli& cli, const std::string& path, const st
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const auto journal,
       session::Journal::Open(path, session::Journal::Mode::kReadOnly, std::move(skip_damaged)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session, kExportOne));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found,
+                              FindSession(*journal, path, session, kExportOne));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
     return WriteOutputFileBy(output, cli.output().force, [&](const std::string& free_path) {
       return session::ExportSessionHdf5(*journal, found.name, free_path);

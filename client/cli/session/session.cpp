@@ -113,8 +113,9 @@ absl::Status ListJournal(const Cli& cli, const std::string& path, bool deleted) 
 absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
   SayIfUnchecked(cli, *journal, options.name);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, options.name, options.in_journal, "touchstone session show FILE NAME"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::JournalSession session,
+      FindSession(*journal, options.name, options.in_journal, "touchstone session show FILE NAME"));
   if (cli.output().json) {
     PrintJson(JournalSessionJson(session));
     return absl::OkStatus();

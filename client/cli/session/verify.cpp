@@ -31,8 +31,9 @@ absl::StatusOr<Found> ReadJournal(const Cli& cli, const VerifyOptions& options) 
                                                      [&](const absl::Status& damage) {
                                                        found.damaged.emplace_back(damage.message());
                                                      }));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, options.name, options.in_journal, "touchstone session verify FILE NAME"));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::JournalSession session,
+      FindSession(*journal, options.name, options.in_journal, "touchstone session verify FILE NAME"));
   found.name = session.name;
   found.checksums = journal->has_checksums();
   ProgressBar bar(!cli.output().quiet);

@@ -94,8 +94,8 @@ TEST_F(SessionsCommandTest, HistorySaysOneThingOfAValue) {
   EXPECT_THAT(steady.out, AllOf(HasSubstr("No value of the model changed"), HasSubstr("Unchanged"),
                                 Not(HasSubstr("catters"))));
   const Outcome moved = Run({"history", "moved", "--model", "rig.yaml"});
-  EXPECT_THAT(moved.out, AllOf(HasSubstr("mm in 1.csv to"), HasSubstr("2.csv and 3.csv"),
-                               Not(HasSubstr("Unchanged"))));
+  EXPECT_THAT(moved.out,
+              AllOf(HasSubstr("mm in 1.csv to"), HasSubstr("2.csv and 3.csv"), Not(HasSubstr("Unchanged"))));
 }
 
 TEST_F(SessionsCommandTest, MistakesAreNamed) {

@@ -13,7 +13,7 @@ import os
 import reprlib
 import typing
 import warnings
-from typing import Any, Callable, NamedTuple, Optional, TypeVar
+from typing import Any, Callable, NamedTuple, TypeVar
 
 from .errors import InvalidRequest
 
@@ -47,7 +47,7 @@ def _is_list_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
         if isinstance(value, (str, bytes, collections.abc.Mapping)) or not isinstance(value, collections.abc.Iterable):
             return False
         # What can be gone through only once is left as it is.
-        return not isinstance(value, collections.abc.Sized) or all(fits(one) for one in value)
+        return not hasattr(value, "__len__") or all(fits(one) for one in value)
 
     return check
 
@@ -125,7 +125,7 @@ def _parts(annotation: str) -> list[str]:
     return [part.strip() for part in parts]
 
 
-def _kind_of(part: str, names: dict[str, Any]) -> Optional[_Kind]:
+def _kind_of(part: str, names: dict[str, Any]) -> _Kind | None:
     """None: an annotation of which nothing is known here."""
     if part in _KINDS:
         return _KINDS[part]
@@ -141,7 +141,7 @@ def _kind_of(part: str, names: dict[str, Any]) -> Optional[_Kind]:
     return None
 
 
-def _check_of(annotation: Any, names: dict[str, Any]) -> Optional[Callable[[str, Any], None]]:
+def _check_of(annotation: Any, names: dict[str, Any]) -> Callable[[str, Any], None] | None:
     """Raises InvalidRequest for a value that the annotation does not allow; None: it cannot be told."""
     if not isinstance(annotation, str):
         return None
@@ -161,7 +161,7 @@ def _check_of(annotation: Any, names: dict[str, Any]) -> Optional[Callable[[str,
 
 
 def _checked_function(function: Any) -> Any:
-    @functools.lru_cache(maxsize=None)
+    @functools.cache
     def checks() -> tuple[tuple[str, ...], dict[str, Callable[[str, Any], None]], dict[str, Any]]:
         # Only now: names of the module that come later than the function are known.
         parameters = inspect.signature(function).parameters
@@ -190,4 +190,4 @@ def checked(what: Decorated) -> Decorated:
     for name, member in list(vars(what).items()):
         if inspect.isfunction(member) and (not name.startswith("_") or name == "__init__"):
             setattr(what, name, _checked_function(member))
-    return typing.cast(Decorated, what)
+    return what

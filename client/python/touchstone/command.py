@@ -144,7 +144,7 @@ def _complain(message: str) -> None:
     print(f"touchstone: error: {printable(as_command(message))}", file=sys.stderr)
 
 
-def run(main: Callable[[list[str]], None]) -> NoReturn:
+def run(main: Callable[[list[str]], object]) -> NoReturn:
     """Calls `main` with the words behind the program, and ends the process as every command ends: 0 done, 2 usage or bad input,
     3 source unreachable, 4 refused or failed, 130 interrupted."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -85,7 +85,7 @@ def parse_targets(targets: Targets) -> tuple[str, ...]:
         if scheme or not host or "/" in host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
             meant = rest.partition("/")[0] if scheme else ""
             example = meant if meant and ":" in meant else "127.0.0.1:50051"
-            port_said = f", the port from 1 to 65535" if port.isdigit() and host and not scheme and "/" not in host else ""
+            port_said = ", the port from 1 to 65535" if port.isdigit() and host and not scheme and "/" not in host else ""
             raise errors.InvalidRequest(f'Target "{target}" is not "host:port"{port_said}; say for instance "{example}".')
     return result
 

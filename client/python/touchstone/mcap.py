@@ -29,6 +29,7 @@ from typing import Any
 from .errors import TouchstoneError
 from .measurements import EMULATED
 from .printable import printable
+from .spoken import as_command
 from .v1 import types_pb2
 from .whole_file import check_target, whole_file
 
@@ -307,7 +308,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         counts = export(options.session, options.output, force=options.force)
     except (ExportError, ImportError, OSError, KeyError) as error:
-        print(printable(f"error: {error}"), file=sys.stderr)
+        print(printable(as_command(f"error: {error}")), file=sys.stderr)
         return 1
     print(printable(f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items())))
     return 0

@@ -33,7 +33,7 @@ def as_python(text: str) -> str:
         return text
     for option, argument in _AS_ARGUMENTS:
         # Only whole options: "a--b" is no option.
-        text = re.sub(rf"(?<![\w-]){option}", argument, text) if option.startswith("--") else re.sub(option, argument, text)  # type: ignore[arg-type]
+        text = re.sub(rf"(?<![\w-]){option}", argument, text) if option.startswith("--") else re.sub(option, argument, text)
     return text
 
 

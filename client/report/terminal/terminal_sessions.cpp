@@ -22,8 +22,8 @@ std::string ChangeInWords(const v1::ComparedValue& value, double p) {
   switch (value.change()) {
     case v1::ComparedEffect::CHANGED:
       return absl::StrCat("changed by ", value.difference() > 0 ? "+" : "",
-                          touchstone::ValueWithError(value.difference(), value.std_error()), " ", value.unit(), " (p ",
-                          Probability(p), ")");
+                          touchstone::ValueWithError(value.difference(), value.std_error()), " ",
+                          value.unit(), " (p ", Probability(p), ")");
     case v1::ComparedEffect::UNCHANGED:
       return absl::StrCat("unchanged, within ",
                           Number(std::max(std::abs(value.lower()), std::abs(value.upper())), 2), " ",
@@ -49,9 +49,9 @@ const v1::SessionValue* OfSession(const v1::ComparedValue& value, int session) {
 
 std::string InSession(const v1::ComparedValue& value, int session) {
   const v1::SessionValue* one = OfSession(value, session);
-  return one == nullptr
-             ? "-"
-             : absl::StrCat(touchstone::ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
+  return one == nullptr ? "-"
+                        : absl::StrCat(touchstone::ValueWithError(one->value(), one->std_error()),
+                                       one->outside() ? " !" : "");
 }
 
 void AddErrors(const v1::Report& report, TextLayout* out) {

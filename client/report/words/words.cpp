@@ -27,11 +27,17 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-std::string Number(double value, int digits) { return RoundedNumber(value, digits); }
+std::string Number(double value, int digits) {
+  return RoundedNumber(value, digits);
+}
 
-std::string Fixed(double value, int decimals) { return FixedNumber(value, decimals); }
+std::string Fixed(double value, int decimals) {
+  return FixedNumber(value, decimals);
+}
 
-std::string Tick(double value) { return RoundNumber(value); }
+std::string Tick(double value) {
+  return RoundNumber(value);
+}
 
 std::string Count(uint64_t count) {
   std::string text = absl::StrCat(count);

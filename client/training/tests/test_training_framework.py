@@ -49,9 +49,15 @@ def training(*arguments, check=None):
 def test_a_mistake_is_named_in_words(tmp_path, monkeypatch, arguments, says):
     monkeypatch.setattr(sys, "argv", ["touchstone.training", *arguments, "--out", str(tmp_path)])
     told = io.StringIO()
-    with contextlib.redirect_stderr(told), pytest.raises(SystemExit) as raised:
+    with contextlib.redirect_stderr(told), pytest.raises((SystemExit, touchstone.InvalidRequest)) as raised:
         command.main()
-    assert raised.value.code not in (0, None) and says in f"{told.getvalue()}{raised.value.code}"
+    assert getattr(raised.value, "code", 2) != 0 and says in f"{told.getvalue()}{raised.value}"
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence_with_an_exit_status():
+    done = subprocess.run([sys.executable, "-m", "touchstone.training", "curvature_histograms", "--out", "/proc/x"], capture_output=True, text=True,
+                          check=False)
+    assert (done.returncode, done.stderr) == (2, "touchstone: error: /proc/x: No such file or directory\n")
 
 
 def test_an_experiment_runs_to_its_report(tmp_path, monkeypatch):

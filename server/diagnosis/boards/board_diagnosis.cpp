@@ -128,7 +128,8 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
                       set.camera_is_guess ? ", which is a guess (no camera.yaml)" : "");
   for (const engine::LadderStep& step : diagnosis.steps) {
     const auto value = [](const engine::ParameterEstimate& p) {
-      return absl::StrCat(p.name, p.entry.empty() ? "" : " ", p.entry, " ", ValueWithError(p.value, p.std_error));
+      return absl::StrCat(p.name, p.entry.empty() ? "" : " ", p.entry, " ",
+                          ValueWithError(p.value, p.std_error));
     };
     absl::StrAppend(&words, " With ", step.effect, " (",
                     absl::StrJoin(step.parameters, ", ",

@@ -109,7 +109,8 @@ class GroupDescriber {
     }
     for (size_t e = 0; e < compared->entries.size(); ++e) {
       ComparedValue& value = compared->entries[e];
-      const bool apart = state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors);
+      const bool apart =
+          state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors);
       SetVerdict(apart, choice_.IsCompared(g) && value.std_error > 0 && Unmoved(sessions, e, value), &value);
     }
   }
@@ -159,7 +160,8 @@ std::vector<SessionRun> RunsOf(const ComparedValue& value) {
         if (!(own.std_error > 0 && mean.std_error > 0)) continue;
         const double weight = 1 / (own.std_error * own.std_error);
         const double before = 1 / (mean.std_error * mean.std_error);
-        mean = {(before * mean.value + weight * own.value) / (before + weight), 1 / std::sqrt(before + weight)};
+        mean = {(before * mean.value + weight * own.value) / (before + weight),
+                1 / std::sqrt(before + weight)};
         continue;
       }
     }
@@ -186,7 +188,7 @@ void SetVerdict(bool apart, bool steady, ComparedValue* value) {
     value->limits[sessions[i]] = chart.limits[i];
     outside = outside || chart.limits[i].outside;
   }
-  value->change = apart                 ? ValueChange::kChanged
+  value->change = apart                ? ValueChange::kChanged
                   : steady && !outside ? ValueChange::kUnchanged
                                        : ValueChange::kCannotSay;
   value->scatter = apart && known.size() >= kMinForScatter ? chart.inside.std_deviation : 0;

@@ -309,10 +309,9 @@ class DifferenceSearch {
     std::vector<std::string> values;
     for (const engine::ParameterEstimate& value : found.more)
       if (std::abs(value.value) > kClearErrors * value.std_error)
-        values.push_back(
-            absl::StrCat(value.name, value.entry.empty() ? "" : " ", value.entry,
-                         value.value > 0 ? " +" : " ", ValueWithError(value.value, value.std_error),
-                         value.unit.empty() ? "" : " ", value.unit));
+        values.push_back(absl::StrCat(
+            value.name, value.entry.empty() ? "" : " ", value.entry, value.value > 0 ? " +" : " ",
+            ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
     std::string words =
         absl::StrCat("Something was other ", absl::StrJoin(places, ", or "), ": ", found.effect,

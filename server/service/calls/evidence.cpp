@@ -22,7 +22,7 @@
 namespace touchstone::service {
 namespace {
 
-constexpr int kMaxAlso = 64;     // model files
+constexpr int kMaxAlso = 64;  // model files
 constexpr size_t kMaxAlsoBytes = 1 << 20;
 
 absl::Status SetTouches(absl::StatusOr<session::MeasurementSet> set, diagnosis::DiagnosisInput* input) {

@@ -25,7 +25,8 @@ _DESCRIPTION = """Recognises objects by touches and photographs that are streame
 and what goes beyond them. Writes report.html, report.json and figures (SVG)."""
 
 
-def main(words: list[str]) -> None:
+def main(words: list[str] | None = None) -> int:
+    words = sys.argv[1:] if words is None else words
     known = experiments()
     options = _parse(known, words)
     settings = _settings(options)
@@ -52,6 +53,7 @@ def main(words: list[str]) -> None:
     for each, why in left_out:
         print(f"{each.title}: left out, {why}")
     print(f"Report: {page}")
+    return 0
 
 
 def _parse(known: list[Experiment], words: list[str]) -> argparse.Namespace:
@@ -95,10 +97,11 @@ def _check_rig(target: str, is_real: bool) -> None:
     """What the source itself says: whether it is a rig, and whether an emulator stands in for its arm."""
     with touchstone.connect(target) as client:
         if not client.is_physical:
-            raise touchstone.InvalidRequest(f"--rig {target}: this is a {client.describe().kind} source, which has no arm; the address of a touchstone-gateway was "
-                     "expected. A simulator is named with --server")
+            raise touchstone.InvalidRequest(f"--rig {target}: this is a {client.describe().kind} source, which has no arm; the address of a "
+                                            "touchstone-gateway was expected. A simulator is named with --server")
         if is_real and client.rig.status().emulated:
-            raise touchstone.InvalidRequest(f"--rig-is-real: the gateway at {target} says that its rig is emulated; its data measure nothing, and are called emulated")
+            raise touchstone.InvalidRequest(f"--rig-is-real: the gateway at {target} says that its rig is emulated; its data measure nothing, "
+                                            "and are called emulated")
 
 
 def _run(experiment: Experiment, context: Context, again: bool) -> Result:

@@ -13,7 +13,8 @@ namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr double kMinP = 1e-300;
-constexpr size_t kMaxRuns = 4;   // of a value that changed; of more, the two sessions that differ most are named
+constexpr size_t kMaxRuns =
+    4;  // of a value that changed; of more, the two sessions that differ most are named
 constexpr size_t kMaxNames = 3;  // of a run; of more, its first and its last
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
@@ -38,9 +39,9 @@ std::string CourseInWords(const Sessions& sessions, const std::vector<DataReport
     std::vector<std::string> names;
     for (const int session : run.sessions) names.push_back(SessionName(data, sessions.taking_part[session]));
     const size_t count = names.size();
-    parts.push_back(absl::StrCat(
-        ValueWithError(run.mean.value, run.mean.std_error), " ", named.unit, " in ",
-        count > kMaxNames ? absl::StrCat(names.front(), " to ", names.back()) : absl::StrJoin(names, " and ")));
+    parts.push_back(absl::StrCat(ValueWithError(run.mean.value, run.mean.std_error), " ", named.unit, " in ",
+                                 count > kMaxNames ? absl::StrCat(names.front(), " to ", names.back())
+                                                   : absl::StrJoin(names, " and ")));
   }
   return absl::StrCat(ValueName(effect, named), " from ", absl::StrJoin(parts, " to "),
                       many && value.runs.size() > kMaxRuns ? ", and in others between" : "");
