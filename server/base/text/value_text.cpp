@@ -10,11 +10,7 @@
 #include <absl/strings/str_format.h>
 
 namespace touchstone {
-namespace {
 
-constexpr int kMaxDigits = 7;  // beyond them nobody reads a value, however small its error
-
-// Decimals that show `digits` significant digits of `value`.
 int DecimalsFor(double value, int digits) {
   if (!(std::abs(value) > 0) || !std::isfinite(value)) return 0;
   // The exponent after rounding: 0.9996 with three digits is 1.00.
@@ -23,6 +19,10 @@ int DecimalsFor(double value, int digits) {
   const int exponent = std::atoi(std::strchr(text, 'e') + 1);
   return std::clamp(digits - 1 - exponent, 0, 9);
 }
+
+namespace {
+
+constexpr int kMaxDigits = 7;  // beyond them nobody reads a value, however small its error
 
 // "3e-9" rather than "3e-09".
 std::string ShortExponent(std::string text) {

@@ -5,6 +5,8 @@
 
 namespace touchstone {
 
+// Decimals that show `digits` significant digits of `value`.
+int DecimalsFor(double value, int digits);
 // With `decimals` decimals; never "-0.0"; "n/a" for NaN.
 std::string FixedNumber(double value, int decimals);
 // `digits` significant digits, no exponent between 1e-4 and 1e7: "41.0", "0.012", "3e-9"; "n/a" for NaN.
