@@ -86,8 +86,8 @@ def test_an_argument_of_a_wrong_kind_is_named_before_anything_is_sent(call, says
 
 
 # Annotations that say more than a type: what has them is checked where it is used, as the tests above find.
-CHECKED_WHERE_USED = {"Targets | None", "Targets", "PlanLike | None", "PlanLike", "ModelLike", "ImageLike | None", "Any", "type", "Credentials | None",
-                      "Client"}
+CHECKED_WHERE_USED = {"Targets | None", "Targets", "PlanLike | None", "PlanLike", "ModelLike", "ImageLike | None", "Any", "type",
+                      "Credentials | None", "Client"}
 
 
 @pytest.mark.parametrize("of", [touchstone.connect, touchstone.sphere, touchstone.faces, touchstone.touches, touchstone.image,

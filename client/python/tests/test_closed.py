@@ -30,7 +30,7 @@ def test_every_call_of_a_closed_client_says_that_it_is_closed(server):
     client.close()
     client.close()
     for name, call in calls(client, dataset, samples, session).items():
-        with pytest.raises(touchstone.Refused, match="The client of .* is closed") as refused:
+        with pytest.raises(touchstone.Refused, match=r"The client of .* is closed") as refused:
             pytest.fail(f"{name} gave {call()!r}")
         assert server.target in str(refused.value)
 

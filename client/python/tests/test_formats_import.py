@@ -360,7 +360,7 @@ def test_what_this_program_exported_needs_no_mapping_and_stays_emulated(tmp_path
     rows = [touchstone.Row(k, "lat20", command, (1000.0 + k, 2000.0, 3000.0), 8.0 * k) for k in range(3)]
     touchstone.write_measurements(tmp_path / "set.csv", rows)
     export(tmp_path / "set.csv", tmp_path / "out", to)
-    [source] = [path for path in (tmp_path / "out").rglob(f"*.{to}")]
+    [source] = (tmp_path / "out").rglob(f"*.{to}")
     assert import_recording(source, tmp_path / "back.csv").rows == 3
     found = _same(tmp_path / "back.csv", rows)
     assert all(row.command.covariates["cov_emulated"][0] == 1 for row in found)

@@ -12,7 +12,8 @@ REPOSITORY = pathlib.Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("said, spoken", [
-    ("'mug' has no mesh; give it with --mesh mug=FILE or --mesh-dir FOLDER", """'mug' has no mesh; give it with meshes={"mug": FILE} or meshes=FOLDER"""),
+    ("'mug' has no mesh; give it with --mesh mug=FILE or --mesh-dir FOLDER",
+     """'mug' has no mesh; give it with meshes={"mug": FILE} or meshes=FOLDER"""),
     ("Name it as --mesh lat20=FILE,unit=m. Then", """Name it as meshes={"lat20": touchstone.Mesh(FILE, unit="m")}. Then"""),
     ("one finger's time (--noise 5000, in us)", "one finger's time (noise_us=5000)"),
     ("(`--save-model FILE --with-surface-map` keeps it)", "(with_surface_map=True keeps it)"),

@@ -99,13 +99,13 @@ def test_an_mcap_file_that_is_there_is_refused_by_the_function_as_by_the_command
 def test_an_error_of_a_writer_names_what_was_asked_for(tmp_path):
     def fail(path):
         with whole_folder(path) as folder:
-            open(folder / "no/such", "w")
+            (folder / "no/such").write_text("")
 
     def fail_in_words(path):
         with whole_folder(path) as folder:
             raise ValueError(f"cannot write {folder}/data.h5")
 
-    with pytest.raises(OSError) as error:
+    with pytest.raises(FileNotFoundError) as error:
         fail(tmp_path / "out")
     assert error.value.filename == f"{tmp_path}/out/no/such" and ".part" not in str(error.value)
     with pytest.raises(ValueError, match=f"cannot write {tmp_path}/out/data.h5$"):

@@ -214,8 +214,8 @@ class TouchstoneDataset(IterableDataset):
         """Goes on there at the next iteration. The number of workers may differ, and, if all ranks had been given
         equally many batches, the number of ranks too."""
         if not isinstance(state, dict) or state.get("version") != 1:
-            said = f"version {state.get('version')!r}" if isinstance(state, dict) else arguments.shown(state)
-            raise InvalidRequest(f"The state has {said}; what state_dict() gave was expected, version 1.")
+            said = f"The state has version {state.get('version')!r}" if isinstance(state, dict) else f"The state is {arguments.shown(state)}"
+            raise InvalidRequest(f"{said}; what state_dict() gave was expected, version 1.")
         epoch, index, skip, served = self._place_in(state)
         if state.get("specification") != self._spec_digest:
             raise InvalidRequest(

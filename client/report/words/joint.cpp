@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/report/words/error_scale.h"
+#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {

@@ -95,6 +95,17 @@ def test_a_source_that_does_not_answer_is_named_without_a_traceback(tmp_path):
     assert done.returncode != 0 and "127.0.0.1:1" in done.stderr and "Traceback" not in done.stderr
 
 
+def test_an_interrupted_run_ends_without_a_traceback_and_with_the_exit_status_of_one(tmp_path):
+    command_line = [sys.executable, "-m", "touchstone.training", "curvature_histograms", "--out", str(tmp_path)]
+    with subprocess.Popen(command_line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        begun = process.stderr.readline()
+        assert begun.startswith("1/1 curvature_histograms: ")
+        process.send_signal(signal.SIGINT)
+        said, told = process.communicate(timeout=120)
+    assert (process.returncode, said, told) == (130, "", "")
+    assert not (tmp_path / "report.json").exists()
+
+
 def counting(tmp_path, monkeypatch, run=None):
     """The command with one experiment that counts its runs."""
     runs = []
