@@ -4,6 +4,8 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 
+#include <filesystem>
+
 #include "client/cli/common/output_file.h"
 #include "client/cli/session/images.h"
 #include "server/base/status.h"
@@ -15,7 +17,7 @@
 
 namespace touchstone::cli {
 
-constexpr char kExportOne[] = "touchstone session export FILE NAME -o NAME.csv";
+constexpr char kExportOne[] = "touchstone session export FILE NAME";
 
 bool IsJournalPath(const std::string& text) {
   return absl::EndsWith(text, ".db");
@@ -53,10 +55,10 @@ absl::StatusOr<session::JournalSession> FindSession(const session::Journal& jour
     return absl::InvalidArgumentError(absl::StrCat(
         path, ": the journal has ", names.size(), " sessions (", list,
         "); say which: ", absl::StrReplaceAll(naming, {{"FILE", path}, {"NAME", names.front()}})));
-  return absl::InvalidArgumentError(
-      absl::StrCat(path, ": the journal has ", names.size(), " sessions (", list,
-                   "); write the one that is meant to a file: touchstone session export ", path, " ",
-                   names.front(), " -o ", names.front(), ".csv"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      path, ": the journal has ", names.size(), " sessions (", list,
+      "); write the one that is meant to a file: touchstone session export ", path, " ", names.front(),
+      " -o ", std::filesystem::path(path).stem().string(), "_", names.front(), ".csv"));
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,

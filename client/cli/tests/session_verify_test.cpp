@@ -80,8 +80,8 @@ TEST_F(SessionVerifyTest, OfSeveralSessionsACommandThatNamesOneIsSaid) {
                 HasSubstr(absl::StrCat("session.db: the journal has 2 sessions (set, tuesday); say "
                                        "which: touchstone session ",
                                        command, " session.db set")));
+    EXPECT_EQ(Run({"session", command, "session.db", "set"}).exit_code, 0) << command;
   }
-  EXPECT_EQ(Run({"session", "verify", "session.db", "set"}).exit_code, 0);
 }
 
 TEST_F(SessionVerifyTest, WithoutAServerANameSaysWhatIsMissing) {

@@ -70,7 +70,8 @@ TEST_F(UsageErrorTest, BadInputIsExitCode2AndNamesFieldAndValue) {
       {{"plan", "lat20", "--mesh-dir", "bad.csv"}, "--mesh-dir: 'bad.csv': Not a directory"},
       {{"compare", "bad.csv", "--mesh-dir", "nope"}, "--mesh-dir: 'nope': No such file"},
       {{"uncertainty", "nope.json", "bad.csv"},
-       "nope.json: No such file or directory; a report was expected"},
+       "nope.json: No such file or directory; a report of `touchstone diagnose SET --json FILE` was "
+       "expected"},
       {{"rig", "status"}, "--server is missing"},
       {{"rig", "stop"}, "--server is missing"},
       {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "FACE: '+w'"},
