@@ -11,6 +11,7 @@
 #include <absl/status/status.h>
 
 #include "server/base/threads/thread_pool.h"
+#include "server/geometry/missing_mesh.h"
 #include "server/geometry/surface/surface.h"
 #include "server/model/model.h"
 #include "server/session/images/image_set.h"
@@ -41,6 +42,17 @@ struct DiagnosisInput {
     return std::find(settled.begin(), settled.end(), effect) != settled.end();
   }
 };
+
+// That every object of a set has a surface; NOT_FOUND names those that have none.
+inline absl::Status CheckMeshes(const DiagnosisInput& input, const std::string& origin,
+                                const std::vector<std::string>& objects) {
+  std::vector<std::string> missing, known;
+  for (const std::string& object : objects)
+    if (input.surfaces.count(object) == 0) missing.push_back(object);
+  if (missing.empty()) return absl::OkStatus();
+  for (const auto& [name, surface] : input.surfaces) known.push_back(name);
+  return geometry::MissingMesh(origin + ": object ", missing, known);
+}
 
 struct DiagnosisContext {
   ThreadPool* pool = nullptr;  // null: this thread alone

@@ -1,10 +1,11 @@
 """A plan of photographs, as `touchstone propose FOLDER` writes it, taken by the emulated rig."""
 import csv
 import json
+import subprocess
 
 import pytest
 
-from test_rig_commands import SPEEDUP, emulated_rig, touchstone
+from test_rig_commands import BIN, PATIENCE_S, SPEEDUP, emulated_rig, touchstone
 
 # The emulated rig exists once.
 pytestmark = pytest.mark.xdist_group("photograph_plan")
@@ -54,3 +55,18 @@ def test_rig_photos_takes_the_rows_of_a_plan(rig, tmp_path):
     touchstone("plan", "lat20", "--plan", "faces", "--samples-per-face", "1", "--rounds", "1", "-o", touches)
     wrong = ["rig", "photos", "lat20", "--plan", touches, "-o", tmp_path / "none", *options]
     assert "is no plan of photographs" in touchstone(*wrong, server=rig, code=2)
+
+
+def test_a_picture_that_the_rig_cannot_take_is_named_with_quiet_and_in_json(rig, tmp_path):
+    view = dict(image=0, file="near.png", object="lat20", eye_x_mm=0, eye_y_mm=0, eye_z_mm=300, at_x_mm=0, at_y_mm=0, at_z_mm=0,
+                up_x=1, up_y=0, up_z=0)
+    write_plan(tmp_path / "next.csv", [view, dict(view, image=1, file="far.png", eye_z_mm=9000)])
+    command = [BIN / "touchstone", "rig", "photos", "lat20", "--plan", tmp_path / "next.csv", "-o", tmp_path / "taken", "--image", "64x48",
+               "--quiet", "--json", "--server", rig]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, stdin=subprocess.DEVNULL, check=True)
+    taken = json.loads(result.stdout)
+    assert [row["file"] for row in rows_of(tmp_path / "taken/images.csv")] == ["near.png"] and taken["left_out"] == 1
+    (left_out,) = taken["impossible"]
+    assert left_out["file"] == "far.png" and left_out["reason"]
+    assert "far.png" in result.stderr and "1 of 2 views is left out; nothing has moved yet" in result.stderr
+    assert "near.png" not in result.stderr

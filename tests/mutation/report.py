@@ -68,7 +68,8 @@ def part(state, outcomes, tests, machine):
         changed = f"{_code(mutant['text'])}: {_code(site['original'])} to {_code(mutant['change'])}"
         lines.append(f"| {number} | {mutant['path']}:{site['line']} | {changed} | {verdict} |")
     if state["broken"]:
-        lines += ["", "Left out, since they fail without a mutant or take more than 10 minutes: " + ", ".join(f"{suite} {name}" for suite, name in state["broken"]) + "."]
+        broken = ", ".join(f"{suite} {name}" for suite, name in state["broken"])
+        lines += ["", f"Left out, since they fail without a mutant or take more than 10 minutes: {broken}."]
     return "\n".join(lines)
 
 

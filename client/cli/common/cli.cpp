@@ -186,7 +186,11 @@ absl::Status Cli::CheckFiles(const CLI::App* command) {
   std::error_code error;
   if (!source_.mesh_folder.empty()) {
     const std::vector<std::string> formats = geometry::MeshFormatNames();
-    for (const auto& entry : std::filesystem::directory_iterator(source_.mesh_folder, error)) {
+    std::filesystem::directory_iterator entries(source_.mesh_folder, error);
+    if (error)
+      return absl::NotFoundError(absl::StrCat("--mesh-dir: '", source_.mesh_folder, "': ", error.message(),
+                                              "; a folder of mesh files was expected"));
+    for (const auto& entry : entries) {
       const std::string extension = absl::AsciiStrToLower(entry.path().extension().string());
       for (const std::string& format : formats)
         if (extension == "." + format) inputs.push_back(entry.path().string());
@@ -244,7 +248,10 @@ void Cli::AddOutputOptions(CLI::App* command) {
 }
 
 void Cli::Log(absl::string_view line) const {
-  if (output_.quiet) return;
+  if (!output_.quiet) Warn(line);
+}
+
+void Cli::Warn(absl::string_view line) const {
   ProgressBar::ClearShown();
   std::fprintf(stderr, "%s\n", Shown(line).c_str());
 }

@@ -111,6 +111,8 @@ class Cli {
   // A line to stderr: Log unless --quiet, Detail only with --verbose.
   void Log(absl::string_view line) const;
   void Detail(absl::string_view line) const;
+  // Also with --quiet: what was asked for and is not done.
+  void Warn(absl::string_view line) const;
 
   // Parses and runs; prints the error, if any, and returns the exit code.
   int Run(int argc, char** argv);

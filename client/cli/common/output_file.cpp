@@ -303,7 +303,8 @@ absl::Status WriteOutputFileBy(const std::string& path, bool force,
     status = file.ok() ? CopyTo(passing, (*file)->number(), path) : file.status();
   }
   ::unlink(passing.c_str());
-  return status;
+  return absl::Status(status.code(),
+                      absl::StrReplaceAll(status.message(), {{passing, to_stdout ? "stdout" : path}}));
 }
 
 }  // namespace touchstone::cli

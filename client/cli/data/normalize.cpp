@@ -1,6 +1,7 @@
 // touchstone normalize: a folder of photographs as dark objects on white, with their masks.
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -72,7 +73,8 @@ class NormalizeRun {
     if (!status.ok()) {
       std::error_code stays;  // a hidden folder, if the disk fails at that too
       fs::remove_all(unfinished_, stays);
-      return status;
+      return absl::Status(status.code(),
+                          absl::StrReplaceAll(status.message(), {{unfinished_.string(), options_.output}}));
     }
     if (cli_.output().json)
       PrintJson({{"folder", options_.output},

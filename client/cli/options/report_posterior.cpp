@@ -56,7 +56,10 @@ double MisfitOf(const ReportJson& report) {
 }  // namespace
 
 absl::StatusOr<ReportedPosterior> PosteriorOfReport(const std::string& path) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  const absl::StatusOr<std::string> read = ReadFile(path);
+  if (!read.ok())
+    return absl::Status(read.status().code(), absl::StrCat(read.status().message(), "; ", kExpected));
+  const std::string& text = *read;
   const ReportJson report = ReportJson::parse(text, nullptr, false);
   if (report.is_discarded() || !report.is_object())
     return absl::InvalidArgumentError(absl::StrCat(path, ": is no JSON object; ", kExpected));

@@ -41,7 +41,7 @@ absl::Status FindFiles(const BundleOptions& options, gateway::bundle::BundleRequ
   TOUCHSTONE_RETURN_IF_ERROR(gateway::bundle::TakeFilesOfConfig(request));
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(request->journal));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, request->journal, request->session));
+                              FindSession(*journal, request->journal, request->session, "--session NAME"));
   request->session = session.name;
   for (const std::string& text : options.meshes) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const source::MeshSpec mesh, service::ParseMeshSpec(text));

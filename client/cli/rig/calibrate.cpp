@@ -78,7 +78,7 @@ absl::StatusOr<FlatTouches> TouchFlat(const Cli& cli, const CalibrateOptions& op
 absl::StatusOr<FlatTouches> RecordedFlat(const CalibrateOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.from));
   TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, options.from, options.motion.session));
+                              FindSession(*journal, options.from, options.motion.session, "--session NAME"));
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<client::MeasuredTouch> recorded,
                               TouchesOf(*journal, session.name));
   FlatTouches flat;

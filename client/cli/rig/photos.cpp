@@ -179,11 +179,12 @@ class Photos {
       if (response.checks(k).possible()) continue;
       asked[k]->wanted = false;
       table.Add({asked[k]->file, response.checks(k).reason()});
+      impossible_.push_back({{"file", asked[k]->file}, {"reason", response.checks(k).reason()}});
       ++left_out_;
     }
     if (left_out_ > 0)
-      cli_.Log(absl::StrCat(table.Text(), "\n", left_out_, " of ", Counted(views_.size(), "view", "views"),
-                            left_out_ == 1 ? " is" : " are", " left out; nothing has moved yet"));
+      cli_.Warn(absl::StrCat(table.Text(), "\n", left_out_, " of ", Counted(views_.size(), "view", "views"),
+                             left_out_ == 1 ? " is" : " are", " left out; nothing has moved yet"));
     return absl::OkStatus();
   }
 
@@ -234,7 +235,8 @@ class Photos {
                  {"images", set_.PathOf("images.csv")},
                  {"camera", set_.PathOf("camera.yaml")},
                  {"kept", kept_},
-                 {"left_out", left_out_}});
+                 {"left_out", left_out_},
+                 {"impossible", impossible_}});
     cli_.Log(absl::StrCat(
         options_.folder, ": ", Counted(files.size(), "picture", "pictures"),
         kept_ > 0 ? absl::StrCat(", ", kept_, " of them stood already") : "",
@@ -254,6 +256,7 @@ class Photos {
   std::vector<SequenceView> views_;  // in the order in which they are taken
   ImageSet set_;
   size_t kept_ = 0, left_out_ = 0;
+  Json impossible_ = Json::array();  // what is left out, and why
   bool emulated_ = false;
 };
 

@@ -2,6 +2,9 @@
 
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+
+#include <filesystem>
 
 #include "client/cli/common/output_file.h"
 #include "client/cli/session/images.h"
@@ -14,6 +17,8 @@
 
 namespace touchstone::cli {
 
+constexpr char kExportOne[] = "touchstone session export FILE NAME";
+
 bool IsJournalPath(const std::string& text) {
   return absl::EndsWith(text, ".db");
 }
@@ -22,8 +27,18 @@ absl::StatusOr<std::unique_ptr<session::Journal>> OpenJournal(const std::string&
   return session::Journal::Open(path, session::Journal::Mode::kReadOnly);
 }
 
+void AddSessionPlace(Cli* cli, CLI::App* command, SessionPlace* place, const std::string& what,
+                     bool has_default) {
+  cli->AddInput(command, command->add_option("NAME", place->name, what)->type_name("")->required());
+  command
+      ->add_option(
+          "SESSION", place->in_journal,
+          absl::StrCat("The session's name in that journal", has_default ? ". Default: its only one" : ""))
+      ->type_name("");
+}
+
 absl::StatusOr<session::JournalSession> FindSession(const session::Journal& journal, const std::string& path,
-                                                    const std::string& name) {
+                                                    const std::string& name, absl::string_view naming) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<session::JournalSession> sessions, journal.Sessions());
   std::vector<std::string> names;
   for (const session::JournalSession& session : sessions) {
@@ -36,9 +51,14 @@ absl::StatusOr<session::JournalSession> FindSession(const session::Journal& jour
         absl::StrCat(path, ": there is no session '", name, "'", DidYouMean(name, names)));
   std::string list;
   for (const std::string& known : names) absl::StrAppend(&list, list.empty() ? "" : ", ", known);
-  return absl::InvalidArgumentError(absl::StrCat(path, ": the journal has ", names.size(), " sessions (",
-                                                 list, "); say which: touchstone session export ", path,
-                                                 " NAME -o set.csv writes one as a measurement file"));
+  if (!naming.empty())
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, ": the journal has ", names.size(), " sessions (", list,
+        "); say which: ", absl::StrReplaceAll(naming, {{"FILE", path}, {"NAME", names.front()}})));
+  return absl::InvalidArgumentError(absl::StrCat(
+      path, ": the journal has ", names.size(), " sessions (", list,
+      "); write the one that is meant to a file: touchstone session export ", path, " ", names.front(),
+      " -o ", std::filesystem::path(path).stem().string(), "_", names.front(), ".csv"));
 }
 
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,
@@ -48,7 +68,7 @@ absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Jour
 
 absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, ""));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, "", ""));
   if (found.done == 0)
     return absl::FailedPreconditionError(
         absl::StrCat(path, ": session '", found.name, "' has no touch that is done"));
@@ -57,7 +77,7 @@ absl::StatusOr<session::MeasurementSet> JournalSet(const std::string& path) {
 
 absl::StatusOr<std::optional<v1::ImageSetFiles>> JournalPhotographs(const Cli& cli, const std::string& path) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, ""));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, "", ""));
   if (found.images == 0) return std::optional<v1::ImageSetFiles>();
   if (found.done > 0) {
     cli.Log(absl::StrCat(Counted(found.images, "photograph", "photographs"), " of session '", found.name,
@@ -85,7 +105,8 @@ absl::StatusOr<std::string> CsvOf(const session::Journal& journal, const std::st
 
 absl::StatusOr<std::string> JournalCsv(const std::string& path, const std::string& session) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(path));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found,
+                              FindSession(*journal, path, session, kExportOne));
   return CsvOf(*journal, path, found.name);
 }
 
@@ -94,7 +115,8 @@ absl::Status ExportFromJournal(const Cli& cli, const std::string& path, const st
   TOUCHSTONE_ASSIGN_OR_RETURN(
       const auto journal,
       session::Journal::Open(path, session::Journal::Mode::kReadOnly, std::move(skip_damaged)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found, FindSession(*journal, path, session));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession found,
+                              FindSession(*journal, path, session, kExportOne));
   if (absl::EndsWith(output, ".h5") || absl::EndsWith(output, ".hdf5"))
     return WriteOutputFileBy(output, cli.output().force, [&](const std::string& free_path) {
       return session::ExportSessionHdf5(*journal, found.name, free_path);

@@ -21,9 +21,20 @@ bool IsJournalPath(const std::string& text);
 
 absl::StatusOr<std::unique_ptr<session::Journal>> OpenJournal(const std::string& path);  // to read
 
-// The session of that name; with an empty name the only one. Errors list what there is.
+// The session of that name; with an empty name the only one. Errors list what there is; where there are several, `naming` is
+// what the command takes to name one: "touchstone session verify FILE NAME" with FILE and NAME replaced. Empty: the command takes
+// a file of one session alone.
 absl::StatusOr<session::JournalSession> FindSession(const session::Journal& journal, const std::string& path,
-                                                    const std::string& name);
+                                                    const std::string& name, absl::string_view naming);
+
+// The arguments NAME and SESSION of a command that takes a session of a server or of a journal. `what` says what NAME may be;
+// `has_default`: the journal's only session needs no name.
+struct SessionPlace {
+  std::string name;
+  std::string in_journal;  // the session's name where NAME is a journal
+};
+void AddSessionPlace(Cli* cli, CLI::App* command, SessionPlace* place, const std::string& what,
+                     bool has_default);
 
 // Its touches that are done, in the order in which they were made.
 absl::StatusOr<std::vector<client::MeasuredTouch>> TouchesOf(const session::Journal& journal,

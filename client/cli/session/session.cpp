@@ -23,9 +23,8 @@
 namespace touchstone::cli {
 namespace {
 
-struct SessionOptions {
-  std::string name, file, output;
-  std::string in_journal;  // the session's name where NAME is a journal
+struct SessionOptions : SessionPlace {
+  std::string file, output;
   bool check = false;
   bool deleted = false, skip_damaged = false;
 };
@@ -114,8 +113,9 @@ absl::Status ListJournal(const Cli& cli, const std::string& path, bool deleted) 
 absl::Status ShowJournal(const Cli& cli, const SessionOptions& options) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const auto journal, OpenJournal(options.name));
   SayIfUnchecked(cli, *journal, options.name);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, options.name, options.in_journal));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::JournalSession session,
+      FindSession(*journal, options.name, options.in_journal, "touchstone session show FILE NAME"));
   if (cli.output().json) {
     PrintJson(JournalSessionJson(session));
     return absl::OkStatus();
@@ -309,16 +309,10 @@ void AddSession(Cli* cli) {
         ->required();
   };
   const auto add_place = [&](CLI::App* command) {
-    cli->AddInput(command, command
-                               ->add_option("NAME", options->name,
-                                            "The name of a server's session, a journal (.db), or for export "
-                                            "to .h5 the folder of an image set")
-                               ->type_name("")
-                               ->required());
-    command
-        ->add_option("SESSION", options->in_journal,
-                     "The session's name in that journal. Default: its only one")
-        ->type_name("");
+    AddSessionPlace(cli, command, options.get(),
+                    "The name of a server's session, a journal (.db), or for export to .h5 the folder of an "
+                    "image set",
+                    /*has_default=*/true);
   };
   const std::string server = " --server 127.0.0.1:50051";
 

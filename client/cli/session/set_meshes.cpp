@@ -1,6 +1,7 @@
 #include "client/cli/session/set_meshes.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -86,6 +87,12 @@ absl::Status AddMeshesOfFolder(const Cli& cli, const std::string& folder,
     source.path = path;
     meshes->emplace(name, source);  // --mesh comes first
   }
+  std::vector<std::string> missing;
+  for (const std::string& object : objects)
+    if (meshes->count(object) == 0) missing.push_back(object);
+  if (!missing.empty())
+    cli.Log(absl::StrCat("note: --mesh-dir: '", folder, "' has no mesh of ", absl::StrJoin(missing, ", "),
+                         ": a built-in shape of that name is taken, if there is one"));
   if (further) AddFurtherMeshes(cli, others, meshes);
   return absl::OkStatus();
 }

@@ -10,8 +10,7 @@
 namespace touchstone::cli {
 namespace {
 
-struct TrashOptions {
-  std::string name, in_journal;
+struct TrashOptions : SessionPlace {
   bool purge = false;
   MotionFlags lease;
 };
@@ -109,13 +108,9 @@ absl::Status CheckInJournal(const std::string& name, const std::string& in_journ
 void AddSessionTrash(Cli* cli, CLI::App* group) {
   auto options = std::make_shared<TrashOptions>();
   const std::string server = " --server 127.0.0.1:50051";
-  const auto add_place = [&](CLI::App* command) {
-    cli->AddInput(
-        command,
-        command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
-            ->type_name("")
-            ->required());
-    command->add_option("SESSION", options->in_journal, "The session's name in that journal")->type_name("");
+  const auto add_arguments = [&](CLI::App* command) {
+    AddSessionPlace(cli, command, options.get(), "The name of a server's session, or a journal (.db)",
+                    /*has_default=*/false);
     AddMotionOptions(command, &options->lease, false);
     cli->AddSourceOptions(command);
   };
@@ -128,14 +123,14 @@ void AddSessionTrash(Cli* cli, CLI::App* group) {
       [cli, options] { return RunDelete(*cli, *options); });
   remove->add_flag("--purge", options->purge,
                    "End every session of this name that is in the trash, for good; the others stay");
-  add_place(remove);
+  add_arguments(remove);
 
   CLI::App* restore = cli->AddCommand(
       group, "restore", "Takes the session that was deleted last under this name out of the trash.",
       "touchstone session restore monday --server 127.0.0.1:50052\n"
       "touchstone session restore session.db monday",
       [cli, options] { return RunRestore(*cli, *options); });
-  add_place(restore);
+  add_arguments(restore);
 }
 
 }  // namespace touchstone::cli

@@ -14,9 +14,7 @@ namespace {
 
 constexpr size_t kMaxDamagesShown = 5;  // of what is damaged
 
-struct VerifyOptions {
-  std::string name, in_journal;
-};
+using VerifyOptions = SessionPlace;
 
 // What reading the whole session found.
 struct Found {
@@ -33,8 +31,9 @@ absl::StatusOr<Found> ReadJournal(const Cli& cli, const VerifyOptions& options) 
                                                      [&](const absl::Status& damage) {
                                                        found.damaged.emplace_back(damage.message());
                                                      }));
-  TOUCHSTONE_ASSIGN_OR_RETURN(const session::JournalSession session,
-                              FindSession(*journal, options.name, options.in_journal));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      const session::JournalSession session,
+      FindSession(*journal, options.name, options.in_journal, "touchstone session verify FILE NAME"));
   found.name = session.name;
   found.checksums = journal->has_checksums();
   ProgressBar bar(!cli.output().quiet);
@@ -139,15 +138,8 @@ void AddSessionVerify(Cli* cli, CLI::App* group) {
       "touchstone session verify session.db\n"
       "touchstone session verify rig.db monday",
       [cli, options] { return RunVerify(*cli, *options); });
-  cli->AddInput(
-      command,
-      command->add_option("NAME", options->name, "The name of a server's session, or a journal (.db)")
-          ->type_name("")
-          ->required());
-  command
-      ->add_option("SESSION", options->in_journal,
-                   "The session's name in that journal. Default: its only one")
-      ->type_name("");
+  AddSessionPlace(cli, command, options.get(), "The name of a server's session, or a journal (.db)",
+                  /*has_default=*/true);
   cli->AddSourceOptions(command);
 }
 

@@ -70,6 +70,20 @@ TEST_F(SessionVerifyTest, ATouchThatAKillLeftUnderWayIsCountedAsInTheList) {
   EXPECT_THAT(verified.err, HasSubstr("is whole: 5 touches (4 of them done)"));
 }
 
+// What is said to be typed is what works.
+TEST_F(SessionVerifyTest, OfSeveralSessionsACommandThatNamesOneIsSaid) {
+  ASSERT_EQ(Run({"session", "import", "set.csv", "-o", "session.db", "--session", "tuesday"}).exit_code, 0);
+  for (const std::string command : {"verify", "show", "export"}) {
+    const Outcome outcome = Run({"session", command, "session.db"});
+    EXPECT_EQ(outcome.exit_code, 2) << command;
+    EXPECT_THAT(outcome.err,
+                HasSubstr(absl::StrCat("session.db: the journal has 2 sessions (set, tuesday); say "
+                                       "which: touchstone session ",
+                                       command, " session.db set")));
+    EXPECT_EQ(Run({"session", command, "session.db", "set"}).exit_code, 0) << command;
+  }
+}
+
 TEST_F(SessionVerifyTest, WithoutAServerANameSaysWhatIsMissing) {
   const Outcome outcome = Run({"session", "verify", "monday"});
   EXPECT_EQ(outcome.exit_code, 2);

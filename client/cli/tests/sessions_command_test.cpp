@@ -81,6 +81,23 @@ TEST_F(SessionsCommandTest, HistoryMarksTheSessionOutsideItsLimits) {
   }
 }
 
+// A value that noise alone moves is called unchanged, and nothing else; the session in which it changed is named.
+TEST_F(SessionsCommandTest, HistorySaysOneThingOfAValue) {
+  std::filesystem::create_directory(Path("steady"));
+  std::filesystem::create_directory(Path("moved"));
+  for (int day = 1; day <= 3; ++day) {
+    MakeSession(absl::StrCat("steady/", day, ".csv"), 1, day);
+    MakeSession(absl::StrCat("moved/", day, ".csv"), day == 1 ? 1 : 2, day);
+  }
+  Write("rig.yaml", absl::StrCat(kQuietModelFile, "  - tip_radius: {radius_mm: 1}\n"));
+  const Outcome steady = Run({"history", "steady", "--model", "rig.yaml"});
+  EXPECT_THAT(steady.out, AllOf(HasSubstr("No value of the model changed"), HasSubstr("Unchanged"),
+                                Not(HasSubstr("catters"))));
+  const Outcome moved = Run({"history", "moved", "--model", "rig.yaml"});
+  EXPECT_THAT(moved.out,
+              AllOf(HasSubstr("mm in 1.csv to"), HasSubstr("2.csv and 3.csv"), Not(HasSubstr("Unchanged"))));
+}
+
 TEST_F(SessionsCommandTest, MistakesAreNamed) {
   MakeSession("monday.csv", 1, 1);
   std::filesystem::create_directory(Path("days"));

@@ -65,6 +65,13 @@ TEST_F(UsageErrorTest, BadInputIsExitCode2AndNamesFieldAndValue) {
       {{"objects", "extra"}, "'extra' is one argument too many"},
       {{"touch", "lat20", "--approach", "0,0,-1", "--session", "a b"},
        "--session: 'a b' is no session's name"},
+      {{"objects", "--mesh-dir", "nope"},
+       "--mesh-dir: 'nope': No such file or directory; a folder of mesh files was expected"},
+      {{"plan", "lat20", "--mesh-dir", "bad.csv"}, "--mesh-dir: 'bad.csv': Not a directory"},
+      {{"compare", "bad.csv", "--mesh-dir", "nope"}, "--mesh-dir: 'nope': No such file"},
+      {{"uncertainty", "nope.json", "bad.csv"},
+       "nope.json: No such file or directory; a report of `touchstone diagnose SET --json FILE` was "
+       "expected"},
       {{"rig", "status"}, "--server is missing"},
       {{"rig", "stop"}, "--server is missing"},
       {{"rig", "mount", "lat20", "+w", "--server", "127.0.0.1:1"}, "FACE: '+w'"},

@@ -1,11 +1,15 @@
 """Mistakes that are found before anything is sent."""
 
+import inspect
+from typing import Any
+
 import numpy as np
 import pytest
 
 import touchstone
-from touchstone import InvalidRequest
+from touchstone import InvalidRequest, arguments
 from touchstone.connection import parse_targets
+from touchstone.diagnosis import Diagnosis
 from touchstone.models import model_ref
 from touchstone.specification import specification
 
@@ -21,17 +25,99 @@ ONE = {"target_mm": (0, 0, 0), "approach": (0, 0, -1), "lateral": (1, 0, 0), "st
     (dict(objects=["a"], samples=1, seed=1.5), "seed is 1.5, not a whole number"),
     (dict(objects=["a"], samples=1, speed_mm_s=0), "speed_mm_s is 0"),
     (dict(objects=["a"], samples=1, speed_mm_s=float("nan")), "speed_mm_s is nan"),
-    (dict(objects=["a"], samples=1, plan=touchstone.sphere(step_angle_deg=0)), "step_angle_deg is 0"),
-    (dict(objects=["a"], plan=touchstone.faces(max_incidence_deg=0)), "max_incidence_deg is 0"),
     (dict(objects=["a"], plan=touchstone.touches([ONE]), speed_mm_s=10), "carry their own"),
     (dict(objects=["a"], samples=1, columns=["descriptor"], image=touchstone.image()), 'add "image"'),
-    (dict(objects=["a"], samples=1, image=touchstone.image(encoding="pgn")), 'Did you mean "png"'),
-    (dict(objects=["a"], samples=1, image=touchstone.image(width=0)), "image width is 0"),
     (dict(objects=["a"], samples=1, model="no/such.yaml"), "no/such.yaml: No such file"),
 ])
 def test_a_mistake_names_the_argument(arguments, says):
     with pytest.raises(InvalidRequest, match=says):
         specification(**arguments)
+
+
+WRONGLY: Any = touchstone  # what no type checker would let through
+
+
+@pytest.mark.parametrize("make, says", [
+    (lambda: WRONGLY.sphere(step_angle_deg=0), "step_angle_deg is 0; it must be above 0"),
+    (lambda: WRONGLY.sphere(step_angle_deg="5"), "step_angle_deg is '5'; a number was expected"),
+    (lambda: WRONGLY.faces(max_incidence_deg=0), "max_incidence_deg is 0"),
+    (lambda: WRONGLY.faces(samples_per_face=2.5), "samples_per_face is 2.5; a whole number was expected"),
+    (lambda: WRONGLY.image(encoding="pgn"), 'Did you mean "png"'),
+    (lambda: WRONGLY.image(format="bmp"), """image format is 'bmp'; it must be "grey" or "rgb\""""),
+    (lambda: WRONGLY.image(width=0), "image width is 0"),
+    (lambda: WRONGLY.Camera(eye_mm=None), "eye_mm is None; a list of numbers was expected"),
+    (lambda: WRONGLY.touch_id("monday", None, 1), "object is None; text was expected"),
+    (lambda: WRONGLY.read_plan(["a.csv"]), r"path is \['a.csv'\]; text or a path was expected"),
+    (lambda: WRONGLY.connect("127.0.0.1:1", timeout_s=0), "timeout_s is 0; it must be above 0"),
+    (lambda: WRONGLY.connect("127.0.0.1:1", retry_for_s=-1), "retry_for_s is -1; it must be 0 or more"),
+    (lambda: WRONGLY.connect("127.0.0.1:1", token=5), "token is 5; text was expected"),
+    (lambda: WRONGLY.connect("http://host:1"), 'Target "http://host:1" is not "host:port"; say for instance "host:1"'),
+    (lambda: WRONGLY.connect("host:70000"), "the port from 1 to 65535"),
+])
+def test_a_mistake_is_found_where_it_is_made(make, says):
+    with pytest.raises(InvalidRequest, match=says):
+        make()
+
+
+CLIENT: Any = touchstone.Client("127.0.0.1:1")  # where nothing answers: no call gets so far
+
+
+@pytest.mark.parametrize("call, says", [
+    (lambda: CLIENT.touch(["lat20"], touchstone.touches([ONE])), r"object is \['lat20'\]; text was expected"),
+    (lambda: CLIENT.touch("lat20", touchstone.touches([ONE]), ids="a"), "ids is 'a'; a list of texts was expected"),
+    (lambda: CLIENT.touch("lat20", [ONE]), "touches is .*; Touches were expected, as touches"),
+    (lambda: CLIENT.dataset(None, samples=1), "objects is None; text or a list of texts was expected"),
+    (lambda: CLIENT.dataset("a", samples=100, start=50, stop=20), "start is 50 and stop is 20"),
+    (lambda: CLIENT.dataset("a", samples=1, uncertainty=5), "uncertainty is 5; a Report of client.diagnose"),
+    (lambda: CLIENT.plan(WRONGLY.faces(2, 1), "a", count=100), "count is 100, and the plan has 12 touches"),
+    (lambda: CLIENT.plan(WRONGLY.faces(2, 1), "a", start=12), "start is 12, and the plan ends with touch 11"),
+    (lambda: CLIENT.capture("a", None), "views is None; Touches, a touchstone.Camera"),
+    (lambda: CLIENT.diagnose(5), "measurements is 5; a measurement file"),
+    (lambda: CLIENT.diagnose("a.csv", meshes={"a": 5}), "meshes is .*; a folder of mesh files"),
+    (lambda: CLIENT.diagnose("a.csv", on_progress=5), "on_progress is 5; a function was expected"),
+    (lambda: CLIENT.dataset("a", samples=1, uncertainty="nope.json"), "nope.json: No such file .*client.diagnose"),
+    (lambda: CLIENT.describe(timeout_s=-1), "timeout_s is -1; it must be above 0"),
+    (lambda: CLIENT.lease(take="yes"), "take is 'yes'; True or False was expected"),
+    (lambda: CLIENT.rig.groups([1]), r"rows is \[1\]; a list of Row was expected"),
+])
+def test_an_argument_of_a_wrong_kind_is_named_before_anything_is_sent(call, says):
+    with pytest.raises(InvalidRequest, match=says):
+        call()
+
+
+# Annotations that say more than a type: what has them is checked where it is used, as the tests above find.
+CHECKED_WHERE_USED = {"Targets | None", "Targets", "PlanLike | None", "PlanLike", "ModelLike", "ImageLike | None", "Any", "type",
+                      "Credentials | None", "Client"}
+
+
+@pytest.mark.parametrize("of", [touchstone.connect, touchstone.sphere, touchstone.faces, touchstone.touches, touchstone.image,
+                                touchstone.box_touches, touchstone.read_plan, touchstone.write_measurements, touchstone.touch_id,
+                                touchstone.Client, Diagnosis, touchstone.Session, touchstone.Rig, touchstone.Camera,
+                                touchstone.Mesh, touchstone.Permutation])
+def test_every_argument_of_a_public_call_is_checked(of):
+    members = [(of.__name__, of)] if inspect.isfunction(of) else [
+        (name, member) for name, member in vars(of).items() if inspect.isfunction(member) and (name == "__init__" or name[0] != "_")]
+    for name, member in members:
+        if name == "to_view":
+            continue
+        assert hasattr(member, "__wrapped__"), f"{name} is not @arguments.checked"
+        for argument in inspect.signature(member).parameters.values():
+            if argument.name == "self" or argument.kind in (argument.VAR_KEYWORD, argument.VAR_POSITIONAL):
+                continue
+            known = argument.annotation in CHECKED_WHERE_USED
+            assert known or arguments._check_of(argument.annotation, inspect.unwrap(member).__globals__), f"{name}({argument})"
+
+
+def test_a_key_is_no_certificate(tmp_path):
+    (tmp_path / "key.pem").write_text("-----BEGIN PRIVATE KEY-----\nMIIB\n-----END PRIVATE KEY-----\n")
+    with pytest.raises(InvalidRequest, match=r"ca='.*key.pem': .* holds a private key; a PEM file that begins with -----BEGIN CERTIFICATE"):
+        touchstone.connect("127.0.0.1:1", ca=tmp_path / "key.pem")
+
+
+def test_a_warning_is_shown_at_the_line_that_called():
+    with pytest.warns(UserWarning, match="samples_per_face") as warned:
+        CLIENT.dataset(["a", "b"], touchstone.faces(8, 1), samples=12)
+    assert warned[0].filename == __file__
 
 
 @pytest.mark.parametrize("image", [(64, 48), [64, 48], touchstone.image(64, 48)])

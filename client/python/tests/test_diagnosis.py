@@ -115,6 +115,14 @@ def test_next_touches_can_be_made(server, measured):
         assert client.touch(row.object, row.command)["complete"].all()
 
 
+def test_why_nothing_is_proposed_is_said_at_the_line_that_asked(client, measured, tmp_path):
+    (tmp_path / "few.csv").write_text("".join(measured.read_text().splitlines(keepends=True)[:6]))
+    with pytest.warns(UserWarning, match=r"Nothing is proposed: .*Make more touches first \(\d+ usable ones\)") as warned:
+        report = client.propose(tmp_path / "few.csv", NOMINAL)
+    assert report.verdict == "too_little_data" and len(report.next_touches) == 0
+    assert warned[0].filename == __file__
+
+
 def test_meshes_of_this_machine_go_along(server, tmp_path):
     corners = [(x, y, z) for x in (-30, 30) for y in (-40, 40) for z in (-20, 20)]
     faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),

@@ -311,7 +311,7 @@ def test_a_message_without_a_pose_is_left_out_and_said(rows, tmp_path):
     (["none.mcap", "-o", "a.csv"], "none.mcap is not there; an MCAP file, a ROS 2 bag"),
     (["log.parquet"], "-o/--out is required (see touchstone import --help)"),
     (["log.parquet", "-o", "a.txt"], "'a.txt' does not say the format; a name that ends in .csv or .db was expected"),
-    (["log.parquet", "-o", "there.csv"], "there.csv exists; replace it with force=True (of a command: --force)"),
+    (["log.parquet", "-o", "there.csv"], "there.csv exists; replace it with --force"),
     (["log.parquet", "-o", "a.csv", "--map", "log.parquet"], "is not UTF-8 text"),
     (["log.parquet", "-o", "a.csv", "--map", "bad.yaml"], "bad.yaml is no YAML"),
     (["log.parquet", "-o", "a.csv", "--map", "other.yaml"], "other.yaml: its first entry is None; 'touchstone: mapping/1' was expected"),
@@ -350,3 +350,27 @@ def test_the_completion_has_what_the_parser_has(run):
     completed = next(line for line in run("completion", "bash").stdout.splitlines() if line.strip().startswith("' import')"))
     options = completed.split("options='")[1].split("'")[0].split()
     assert sorted(options) == sorted(name for action in import_parser()._actions for name in action.option_strings)
+
+
+@pytest.mark.parametrize("to", ["mcap", "parquet"])
+def test_what_this_program_exported_needs_no_mapping_and_stays_emulated(tmp_path, server_program, monkeypatch, to):
+    pytest.importorskip("mcap" if to == "mcap" else "pyarrow")
+    monkeypatch.setenv("PATH", f"{server_program.parent}:{os.environ['PATH']}")
+    command = touchstone.touches(target_mm=(0, 0, 70), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=60, cov_emulated=1.0)
+    rows = [touchstone.Row(k, "lat20", command, (1000.0 + k, 2000.0, 3000.0), 8.0 * k) for k in range(3)]
+    touchstone.write_measurements(tmp_path / "set.csv", rows)
+    export(tmp_path / "set.csv", tmp_path / "out", to)
+    [source] = (tmp_path / "out").rglob(f"*.{to}")
+    assert import_recording(source, tmp_path / "back.csv").rows == 3
+    found = _same(tmp_path / "back.csv", rows)
+    assert all(row.command.covariates["cov_emulated"][0] == 1 for row in found)
+    assert [row.session_time_s for row in found] == [0, 8, 16]
+
+
+def test_an_exported_session_counts_its_rows_when_it_is_copied(tmp_path, server_program, monkeypatch):
+    pytest.importorskip("h5py")
+    monkeypatch.setenv("PATH", f"{server_program.parent}:{os.environ['PATH']}")
+    command = touchstone.touches(target_mm=(0, 0, 70), approach=(0, 0, -1), lateral=(1, 0, 0), standoff_mm=60)
+    touchstone.write_measurements(tmp_path / "set.csv", [touchstone.Row(k, "lat20", command, (1.0, 2.0, 3.0), 8.0 * k) for k in range(3)])
+    assert export(tmp_path / "set.csv", tmp_path / "one", "hdf5").rows == 3
+    assert export(tmp_path / "one/session.h5", tmp_path / "two", "hdf5").rows == 3

@@ -108,7 +108,7 @@ def test_sessions_take_one_model(client, sessions):
 
 
 def test_what_takes_the_place_of_touches_or_a_model_is_named(client, measured, tmp_path, monkeypatch):
-    with pytest.raises(touchstone.InvalidRequest, match=r"touches is list; Touches were expected, as touches\(\)"):
+    with pytest.raises(touchstone.InvalidRequest, match=r"touches is \[\]; Touches were expected, as touches\(\)"):
         client.touch("lat20", [])
     monkeypatch.chdir(tmp_path)
     (tmp_path / "set.csv").write_bytes(measured.read_bytes())

@@ -67,7 +67,7 @@ def test_a_mask_of_another_length_and_a_single_bool_are_refused(samples, index, 
 
 
 def test_true_is_no_number_of_samples(server):
-    with pytest.raises(touchstone.InvalidRequest, match="samples is True, not a whole number"):
+    with pytest.raises(touchstone.InvalidRequest, match="samples is True; a whole number was expected"):
         touchstone.connect(server.target).samples(**{**OPTIONS, "samples": True})
 
 

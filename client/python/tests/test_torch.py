@@ -216,6 +216,38 @@ def test_a_state_of_another_dataset_is_refused(server):
         dataset(server, seed=6).load_state_dict(state)
 
 
+@pytest.mark.parametrize("changes, says", [
+    ({"version": 2}, "The state has version 2; what state_dict"),
+    ({"epoch": -1}, "The state's epoch is -1; it must lie between 0 and"),
+    ({"next_index": 1.5}, "The state's next_index is 1.5, not a whole number"),
+    ({"next_index": 10**12}, "The state's next_index is 1000000000000; it must lie between 0 and"),
+    ({"skip_samples": 64}, "The state's skip_samples is 64; it must lie between 0 and 63"),
+    ({"served": "ab"}, "The state's served is 'ab'; 64 hexadecimal digits or none were expected"),
+])
+def test_a_value_of_a_state_that_cannot_be_is_named(changes, says):
+    data = TouchstoneDataset("127.0.0.1:1", **OPTIONS)  # where nothing answers: a state is checked before anything is asked
+    with pytest.raises(touchstone.InvalidRequest, match=says):
+        data.load_state_dict({**data.state_dict(), **changes})
+
+
+def test_what_is_no_state_is_refused():
+    data = TouchstoneDataset("127.0.0.1:1", **OPTIONS)
+    none: Any = None
+    with pytest.raises(touchstone.InvalidRequest, match="The state is None; what state_dict"):
+        data.load_state_dict(none)
+    state = data.state_dict()
+    del state["epoch"], state["served"]
+    with pytest.raises(touchstone.InvalidRequest, match="The state has no epoch, served; what state_dict"):
+        data.load_state_dict(state)
+
+
+@pytest.mark.parametrize("workers, says", [(-1, "num_workers is -1; it must lie between 0 and 65536"),
+                                           ("2", "num_workers is '2'; a whole number was expected")])
+def test_a_number_of_workers_that_cannot_be_is_named(workers, says):
+    with pytest.raises(touchstone.InvalidRequest, match=says):
+        TouchstoneDataset("127.0.0.1:1", **OPTIONS).loader(num_workers=workers)
+
+
 def test_a_broken_loop_begins_its_epoch_anew(server):
     loader = dataset(server).loader(num_workers=2)
     for _ in zip(range(3), loader):

@@ -10,7 +10,7 @@ import touchstone
 from touchstone import mcap
 from touchstone.report import Report
 from touchstone.v1 import diagnosis_pb2
-from touchstone.whole_file import whole_file
+from touchstone.whole_file import whole_file, whole_folder
 
 
 @pytest.fixture
@@ -94,3 +94,19 @@ def test_an_mcap_file_that_is_there_is_refused_by_the_function_as_by_the_command
     pytest.importorskip("mcap")
     with pytest.raises(mcap.ExportError, match=r"a\.mcap exists; replace it with force=True"):
         mcap.export(tmp_path / "a.h5", tmp_path / "a.mcap")
+
+
+def test_an_error_of_a_writer_names_what_was_asked_for(tmp_path):
+    def fail(path):
+        with whole_folder(path) as folder:
+            (folder / "no/such").write_text("")
+
+    def fail_in_words(path):
+        with whole_folder(path) as folder:
+            raise ValueError(f"cannot write {folder}/data.h5")
+
+    with pytest.raises(FileNotFoundError) as error:
+        fail(tmp_path / "out")
+    assert error.value.filename == f"{tmp_path}/out/no/such" and ".part" not in str(error.value)
+    with pytest.raises(ValueError, match=f"cannot write {tmp_path}/out/data.h5$"):
+        fail_in_words(tmp_path / "out")

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks
+from . import arguments, checks
 from .errors import InvalidRequest
 from .plans import Touches, touches
 
 
+@arguments.checked
 def box_touches(min_mm: Sequence[float], max_mm: Sequence[float], samples_per_face: int = 8, *, seed: int = 0,
                 max_tilt_deg: float = 20.0, spread: float = 0.6, standoff_mm: float = 60.0, stroke_mm: float | None = None,
                 speed_mm_s: float = 20.0) -> Touches:

@@ -31,6 +31,8 @@ def uint64(name: str, value: Any) -> int:
 def number(name: str, value: Any) -> float:
     """The value as a finite float. Physical bounds are the source's to check."""
     try:
+        if isinstance(value, (str, bytes, bool)):  # "20" is text, and True is no 1 of anybody
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise InvalidRequest(f"{name} is {value!r}, not a number.") from None
@@ -47,9 +49,26 @@ def positive(name: str, value: Any) -> float:
     return result
 
 
+def not_negative(name: str, value: Any) -> float:
+    """The value as a finite float, 0 or more."""
+    result = number(name, value)
+    if result < 0:
+        raise InvalidRequest(f"{name} is {result:g}; it must be 0 or more.")
+    return result
+
+
+def part(start: Any, stop: Any, end: int) -> tuple[int, int]:
+    """(start, stop) of a part of `end` samples; a stop of None is the end. InvalidRequest where start is behind stop."""
+    last = end if stop is None else whole_number("stop", stop, 0, end)
+    first = whole_number("start", start, 0, end)
+    if first > last:
+        raise InvalidRequest(f"start is {first} and stop is {last}; start must not be behind stop, the sample after the last one.")
+    return first, last
+
+
 def choice(name: str, value: str, choices: Mapping[str, Any]) -> Any:
     """The enum value of a word; InvalidRequest names the allowed words."""
-    if value in choices:
+    if isinstance(value, str) and value in choices:
         return choices[value]
     raise InvalidRequest(f'{name} is {value!r}; it must be {_either(choices)}.{_hint(value, choices)}')
 

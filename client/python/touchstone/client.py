@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import warnings
+import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import checks, units
+from . import arguments, checks, units
 from .batch import Batch
 from .connection import Connection, Targets, chosen_targets
 from .credentials import Credentials
@@ -21,7 +21,7 @@ from .images import ImageLike, Views, image as default_image, to_image, to_views
 from .lease import Lease, holder as lease_holder
 from .models import Description, Effect, Model, ModelLike, ObjectInfo, model_ref
 from .own_server import OwnServer
-from .plans import PlanLike, Touches, checked_touches, plan_message
+from .plans import PlanLike, Touches, plan_message
 from .posterior import PosteriorLike
 from .printable import printable
 from .retry import RETRY_FOR_S, Retry
@@ -36,9 +36,11 @@ _SOURCE = source_pb2_grpc.SourceStub
 _MODELS = models_pb2_grpc.ModelsStub
 
 
+@arguments.checked
 def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for_s: float = RETRY_FOR_S,
-            ca: str | None = None, cert: str | None = None, key: str | None = None, token: str | None = None,
-            token_file: str | None = None) -> Client:
+            ca: str | os.PathLike[str] | None = None, cert: str | os.PathLike[str] | None = None,
+            key: str | os.PathLike[str] | None = None, token: str | None = None,
+            token_file: str | os.PathLike[str] | None = None) -> Client:
     """A client of one source, or of several equal ones ("a:50051,b:50051" or a list) of which one is used at a time.
 
     Args:
@@ -57,6 +59,8 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
       SourceUnreachable: none of them answers, or TLS or credentials do not fit; the message says which.
       InvalidRequest: a target is no "host:port".
     """
+    checks.positive("timeout_s", timeout_s)
+    checks.not_negative("retry_for_s", retry_for_s)
     targets = chosen_targets(targets)
     if targets is None:
         own = OwnServer()
@@ -65,10 +69,15 @@ def connect(targets: Targets | None = None, *, timeout_s: float = 3.0, retry_for
         client.own_server = own
     else:
         client = Client(targets, retry_for_s=retry_for_s, credentials=Credentials.of(ca, cert, key, token, token_file))
-    client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
+    try:
+        client.describe(timeout_s=timeout_s, retry_for_s=timeout_s)
+    except BaseException:
+        client.close()
+        raise
     return client
 
 
+@arguments.checked
 class Client(Diagnosis):
     """A source of touches and images. Usable as a context manager.
 
@@ -82,7 +91,7 @@ class Client(Diagnosis):
     """
 
     def __init__(self, targets: Targets, *, retry_for_s: float = RETRY_FOR_S, credentials: Credentials | None = None):
-        super().__init__(Connection(targets, checks.number("retry_for_s", retry_for_s), credentials=credentials))
+        super().__init__(Connection(targets, checks.not_negative("retry_for_s", retry_for_s), credentials=credentials))
         self.own_server: OwnServer | None = None
         self._description: Description | None = None
         self._leases: list[Lease] = []
@@ -112,19 +121,34 @@ class Client(Diagnosis):
         return self._connection.credentials
 
     def close(self) -> None:
-        """Closes the connection, and ends the server that connect() started for this client."""
+        """Gives back what leases it holds, closes the connection, and ends the server that connect() started for this client.
+
+        Every later call of it, and of the datasets, sessions and rig that it made, is Refused.
+        """
+        for lease in list(self._leases):
+            lease.release()
         self._connection.close()
         if self.own_server is not None:
             self.own_server.stop()
 
     def __enter__(self) -> Client:
+        self._connection.check_open()
         return self
 
     def __exit__(self, *_: Any) -> None:
         self.close()
 
     def describe(self, *, timeout_s: float | None = None, retry_for_s: float | None = None) -> Description:
-        """What the source is, its limits, and what it can do."""
+        """What the source is, its limits, and what it can do.
+
+        Args:
+          timeout_s: how long to wait for an answer of each target; None: for ever.
+          retry_for_s: how long a lost source is tried again; None: as the client's.
+        """
+        if timeout_s is not None:
+            checks.positive("timeout_s", timeout_s)
+        if retry_for_s is not None:
+            checks.not_negative("retry_for_s", retry_for_s)
         self._description = Description.from_proto(
             self._connection.call(_SOURCE, "Describe", source_pb2.DescribeRequest(), timeout_s=timeout_s,
                                   retry_for_s=retry_for_s)
@@ -134,7 +158,12 @@ class Client(Diagnosis):
     @property
     def is_physical(self) -> bool:
         """Whether the source moves something."""
-        return (self._description or self.describe()).kind == "physical"
+        return self._described().kind == "physical"
+
+    def _described(self) -> Description:
+        """What is known of the source already, or asked for now."""
+        self._connection.check_open()
+        return self._description or self.describe()
 
     def lease(self, *, take: bool = False) -> Lease:
         """The right to move the source, for a `with` block; nothing at a source that needs none.
@@ -145,7 +174,7 @@ class Client(Diagnosis):
         Args:
           take: from whoever holds it; agree with them first.
         """
-        needed = (self._description or self.describe()).lease_required
+        needed = self._described().lease_required
         return _Held(self._connection, needed, take, self._leases)
 
     @contextlib.contextmanager
@@ -157,10 +186,12 @@ class Client(Diagnosis):
     @property
     def held_token(self) -> str:
         """The token of the lease that is held now, or ""."""
+        self._connection.check_open()
         return self._leases[-1].token if self._leases else ""
 
     def session(self, name: str = "default", *, take_lease: bool = False) -> Session:
         """Touches of one session, under ids, so that it can be resumed. See Session."""
+        self._connection.check_open()
         return Session(self, name, take_lease)
 
     def stop(self, reason: str = "") -> int:
@@ -213,28 +244,40 @@ class Client(Diagnosis):
         request = models_pb2.CreateModelRequest(yaml=reference.yaml, validate_only=check_only)
         return Model.from_proto(self._connection.call(_MODELS, "CreateModel", request))
 
-    def plan(self, plan: PlanLike, object: str = "", count: int = 100, *, seed: int = 0, start: int = 0,
+    def plan(self, plan: PlanLike, object: str = "", count: int | None = None, *, seed: int = 0, start: int = 0,
              speed_mm_s: float = 20.0, model: ModelLike = None, max_draws: int = 0) -> Touches:
         """The commanded touches `start` .. `start + count - 1` of a plan for one object; nothing is touched.
+
+        By default all from `start` on of a plan that has an end, 100 of sphere().
 
         A touch of sphere() or faces() is drawn again until every finger completes it; `draws` says how often. What is
         odd about the touches or the object's size is a UserWarning.
 
         Args:
+          count: how many; no more than a plan that has an end holds.
           model: what the real rig has: its fingers, with its effects, must all meet the object. None: the source's own.
           max_draws: draws for one touch before the plan is refused, with the reason; 0: the source's own limit.
         """
         message = plan_message(plan)
         if not isinstance(plan, Touches):
             message.speed_m_s = units.si_value("speed_m_s", checks.positive("speed_mm_s", speed_mm_s))
+        checks.uint64("start", start)
+        end = plan.samples(1)
+        if end and start >= end:
+            raise InvalidRequest(f"start is {start}, and the plan ends with touch {end - 1}: it has {end} of one object.")
+        left = end - start if end else 100
+        count = left if count is None else checks.whole_number("count", count, 1, 2**32 - 1)
+        if end and count > left:
+            raise InvalidRequest(f"count is {count}, and the plan has {left} touches of one object from start={start} on: leave count out "
+                                 f"for all of them, or give 1 to {left}.")
         request = source_pb2.ExpandPlanRequest(
-            plan=message, object=object, seed=checks.uint64("seed", seed), first_index=checks.uint64("start", start),
-            count=checks.whole_number("count", count, 1, 2**32 - 1), model=model_ref(model),
+            plan=message, object=object, seed=checks.uint64("seed", seed), first_index=start,
+            count=count, model=model_ref(model),
             max_draws=checks.whole_number("max_draws", max_draws, 0, 2**32 - 1),
         )
         reply = self._connection.call(_SOURCE, "ExpandPlan", request)
         for note in reply.notes:
-            warnings.warn(note, stacklevel=2)
+            arguments.warn(note)
         return Touches.from_messages(reply.touches, reply.draws.draws)
 
     def touch(self, object: str, touches: Touches, *, model: ModelLike = None, seed: int = 0, start: int = 0,
@@ -260,7 +303,7 @@ class Client(Diagnosis):
           source measured, one message per touch (touchstone.v1.Measured). A start inside of the object or an
           implausible size of it is a UserWarning.
         """
-        checked_touches("touches", touches)
+        arguments.instance("touches", touches, Touches)
         if ids is not None and len(ids) != len(touches):
             raise InvalidRequest(f"ids has {len(ids)} entries for {len(touches)} touches; give one each.")
         if session:
@@ -271,13 +314,13 @@ class Client(Diagnosis):
             series=series,
         )
         if previous is not None:
-            checked_touches("previous", previous[1])
+            arguments.instance("previous", previous[1], Touches)
             request.previous.extend(source_pb2.PreviousTouch(object=previous[0], touch=touch)
                                     for touch in previous[1][-2:].to_messages())
         with contextlib.nullcontext() if lease_token else self._leased() as lease:
             reply = self._touch(request, lease)
         for note in reply.notes:
-            warnings.warn(note, stacklevel=2)
+            arguments.warn(note)
         columns = {}
         for name, entry in (("descriptor_s", ()), ("contact_time_s", ()), ("travel_m", ()),
                             ("contact_point_m", (3,)), ("normal", (3,))):
@@ -354,7 +397,7 @@ class Client(Diagnosis):
 
     def dataset(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
-                touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                touch_interval_s: float = 0.0, columns: str | Sequence[str] | None = None,
                 image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
                 models_from: PosteriorLike = None, batch_size: int | None = None, start: int = 0,
                 stop: int | None = None, stride: int = 1, units: str = "lab",
@@ -401,7 +444,7 @@ class Client(Diagnosis):
 
     def samples(self, objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                 seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
-                touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                touch_interval_s: float = 0.0, columns: str | Sequence[str] | None = None,
                 image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
                 models_from: PosteriorLike = None, units: str = "lab",
                 session: str = "") -> Samples:

@@ -22,6 +22,7 @@ from typing import Any, NoReturn
 
 from .errors import InvalidRequest, NotFound, SourceUnreachable, TouchstoneError
 from .printable import printable
+from .spoken import as_command
 
 # As client/cli/common/exit_code.h.
 BAD_INPUT, UNREACHABLE, REFUSED, INTERRUPTED = 2, 3, 4, 130
@@ -140,10 +141,10 @@ def log(quiet: bool, line: str) -> None:
 
 def _complain(message: str) -> None:
     sys.stdout.flush()
-    print(f"touchstone: error: {printable(message)}", file=sys.stderr)
+    print(f"touchstone: error: {printable(as_command(message))}", file=sys.stderr)
 
 
-def run(main: Callable[[list[str]], None]) -> NoReturn:
+def run(main: Callable[[list[str]], object]) -> NoReturn:
     """Calls `main` with the words behind the program, and ends the process as every command ends: 0 done, 2 usage or bad input,
     3 source unreachable, 4 refused or failed, 130 interrupted."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)

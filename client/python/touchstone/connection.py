@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import time
+import weakref
 from collections.abc import Iterable, Sequence
 from typing import Any, Union
 
@@ -79,21 +80,35 @@ def parse_targets(targets: Targets) -> tuple[str, ...]:
     for target in result:
         if target.startswith(("unix:", "dns:", "ipv4:", "ipv6:", "passthrough:")):
             continue
-        host, _, port = target.rpartition(":")
-        if not host or not port.isdigit() or not 0 < int(port) < 65536:
-            raise errors.InvalidRequest(f'Target "{target}" is not "host:port"; say for instance "127.0.0.1:50051".')
+        scheme, _, rest = target.rpartition("://")
+        host, _, port = rest.rpartition(":")
+        if scheme or not host or "/" in host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
+            meant = rest.partition("/")[0] if scheme else ""
+            example = meant if meant and ":" in meant else "127.0.0.1:50051"
+            port_said = ", the port from 1 to 65535" if port.isdigit() and host and not scheme and "/" not in host else ""
+            raise errors.InvalidRequest(f'Target "{target}" is not "host:port"{port_said}; say for instance "{example}".')
     return result
+
+
+class _Family:
+    """The connections of one client, which close() ends together."""
+
+    def __init__(self) -> None:
+        self.closed = False
+        self.members: weakref.WeakSet[Connection] = weakref.WeakSet()
 
 
 class Connection:
     """Not thread-safe to reconnect; give every thread its own."""
 
     def __init__(self, targets: Targets, retry_for_s: float = retry.RETRY_FOR_S, begin_with: int = 0,
-                 credentials: Credentials | None = None):
+                 credentials: Credentials | None = None, family: _Family | None = None):
         """`begin_with`: which target comes first, modulo their number, so that many clients spread over them.
 
         `credentials`: what the targets are shown; None: what the environment says.
         """
+        self._family = _Family() if family is None else family
+        self._family.members.add(self)
         self.targets = parse_targets(targets)
         self.retry_for_s = retry_for_s
         self.credentials = Credentials.of() if credentials is None else credentials
@@ -106,10 +121,18 @@ class Connection:
         return self.targets[self._position]
 
     def another(self) -> Connection:
-        """A new one to the same targets, beginning with the one in use."""
-        return Connection(self.targets, self.retry_for_s, self._position, self.credentials)
+        """A new one to the same targets, beginning with the one in use; close() of either ends both."""
+        self.check_open()
+        return Connection(self.targets, self.retry_for_s, self._position, self.credentials, self._family)
+
+    def check_open(self) -> None:
+        """Raises Refused after close()."""
+        if self._family.closed:
+            raise errors.Refused(f"The client of {', '.join(self.targets)} is closed, and what was made with it: make a new one with "
+                                 "touchstone.connect().")
 
     def channel(self) -> grpc.Channel:
+        self.check_open()
         if self._channel is not None and self._pid != os.getpid():
             raise self._forked()
         if self._channel is None:
@@ -130,13 +153,20 @@ class Connection:
 
     def move_on(self) -> None:
         """Leaves the target that was lost; the next call goes to the next one."""
-        self.close()
+        self.disconnect()
         self._position = (self._position + 1) % len(self.targets)
 
-    def close(self) -> None:
+    def disconnect(self) -> None:
+        """Leaves the channel; the next call opens one again."""
         if self._channel is not None and self._pid == os.getpid():
             self._channel.close()
         self._channel = None
+
+    def close(self) -> None:
+        """For good, with every connection that came from this one or that it came from: each call after it is Refused."""
+        self._family.closed = True
+        for member in list(self._family.members):
+            member.disconnect()
 
     def call(self, stub: type, method: str, request: Any, *, timeout_s: float | None = None, repeat: bool = True,
              retry_for_s: float | None = None) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
+import re
 import socket
 import ssl
 from typing import Any, Callable
@@ -67,8 +68,8 @@ class Credentials:
                 'certificate, ca=FILE (or ca="system"), or leave the token out.'
             )
         channel = open_channel(target, options, grpc.ssl_channel_credentials(
-            None if self.ca == "system" else _read("ca", self.ca),
-            _read("key", self.key) if self.key else None, _read("cert", self.cert) if self.cert else None,
+            None if self.ca == "system" else _pem("ca", self.ca),
+            _pem("key", self.key) if self.key else None, _pem("cert", self.cert) if self.cert else None,
         ) if self.ca else None)
         if not self.token and not self.token_file:
             return channel
@@ -135,6 +136,16 @@ def _read(what: str, path: str) -> bytes:
         return pathlib.Path(path).read_bytes()
     except OSError as error:
         raise errors.InvalidRequest(f"{what}: {path}: {error.strerror}.") from None
+
+
+def _pem(what: str, path: str) -> bytes:
+    """A file of certificates, or of a private key; the other way round is a mistake that gRPC reports as a lost connection."""
+    text = _read(what, path)
+    wanted, other = ("PRIVATE KEY", "CERTIFICATE") if what == "key" else ("CERTIFICATE", "PRIVATE KEY")
+    if re.search(rb"-----BEGIN [A-Z0-9 ]*" + wanted.encode() + rb"-----", text):
+        return text
+    found = f"holds a {other.lower()}" if other.encode() in text else "is no PEM file"
+    raise errors.InvalidRequest(f"{what}={path!r}: {path} {found}; a PEM file that begins with -----BEGIN {wanted}----- was expected.")
 
 
 def _probing_context(credentials: Credentials) -> ssl.SSLContext:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Callable
 
 import grpc
 
-from . import checks, errors, images, units
+from . import arguments, checks, errors, images, units
 from .batch import Batch
 from .connection import Connection
 from .printable import printable
@@ -105,8 +104,7 @@ class Dataset:
         self.batch_size = resolve_batch_size(spec, batch_size)
         self._indices = indices
         end = spec.samples if indices is None else len(indices)
-        self.stop = end if stop is None else checks.whole_number("stop", stop, 0, end)
-        self.start = checks.whole_number("start", start, 0, end)
+        self.start, self.stop = checks.part(start, stop, end)
         self.stride = checks.whole_number("stride", stride, 1, 2**32 - 1)
         self._connection = connection
         self._si = si
@@ -232,8 +230,6 @@ class Dataset:
                     "FAILED_PRECONDITION", self._connection.target,
                 )
         if header.version != self._header.version:
-            warnings.warn(
+            arguments.warn(
                 f"{self._connection.target} runs version {header.version}, the dataset began with "
-                f"{self._header.version}; its samples may differ.",
-                stacklevel=3,
-            )
+                f"{self._header.version}; its samples may differ.")

@@ -9,7 +9,7 @@ from typing import Any, Callable
 
 import grpc
 
-from . import checks, errors
+from . import arguments, checks, errors
 from .connection import Connection
 from .evidence import MeasurementsLike, MeshesLike, evidence, sessions
 from .models import ModelLike, model_ref
@@ -22,6 +22,18 @@ from .v1 import diagnosis_pb2, diagnosis_pb2_grpc
 OnProgress = Callable[[str, float], None]
 
 
+def _why_nothing(report: Report) -> str:
+    """Why propose() has nothing to propose, and what is missing."""
+    needed = max((data.needed for data in report.message.data), default=0)
+    if report.verdict == "too_little_data":
+        return (f"{report.summary} Make more touches first{f' ({needed} usable ones)' if needed else ''}: client.plan(touchstone.faces(), "
+                "OBJECT) plans some, for a session or touch() to make.")
+    if report.message.data_problems:
+        return f"the set must be fixed first. {report.summary}"
+    return "no explanations are left that further measurements would tell apart."
+
+
+@arguments.checked
 class Diagnosis:
     """The questions about measured touches and photographs: how wrong is a model, where, why, and what to add.
 
@@ -98,7 +110,10 @@ class Diagnosis:
             request.touches = checks.whole_number("touches", touches, 1, 2**32 - 1)
         if photographs is not None:
             request.photographs = checks.whole_number("photographs", photographs, 1, 2**32 - 1)
-        return self._report("Propose", request, on_progress)
+        report = self._report("Propose", request, on_progress)
+        if not report.message.next:
+            arguments.warn(f"Nothing is proposed: {_why_nothing(report)}")
+        return report
 
     def check(self, plan: str | os.PathLike[str], model: ModelLike = None, *, meshes: MeshesLike = None,
               noise_us: float | None = None, improve: int = 0, find: str = "", between: Sequence[str] = (), seed: int = 0,

@@ -9,6 +9,7 @@ import grpc
 from .channel import proxy_for
 from .printable import printable
 from .sent_files import name_files
+from .spoken import as_python
 
 
 class TouchstoneError(Exception):
@@ -82,7 +83,7 @@ def from_rpc(error: grpc.RpcError, target: str, request: Any = None) -> Touchsto
     """The exception for a failed call; raise it `from None`. With the request, files that it holds are named by their paths."""
     code = error.code().name
     details = error.details() or (_NOT_OFFERED if code == "UNIMPLEMENTED" else "no message")
-    details = name_files(details, request)
+    details = as_python(name_files(details, request))
     kind = _CLASSES.get(code, SourceFailed)
     if kind is SourceUnreachable:
         proxy = proxy_for(target)

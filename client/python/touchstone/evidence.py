@@ -10,7 +10,7 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
-from . import checks
+from . import arguments, checks
 from .errors import InvalidRequest
 from .models import ModelLike, model_ref, read_model_file
 from .v1 import diagnosis_pb2
@@ -18,6 +18,7 @@ from .v1 import diagnosis_pb2
 _FORMATS = ("off", "obj", "stl", "ply")
 
 
+@arguments.checked
 @dataclasses.dataclass(frozen=True)
 class Mesh:
     """A mesh file that is not in millimetres with +z up.

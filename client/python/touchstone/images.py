@@ -7,7 +7,7 @@ import numbers
 from collections.abc import Sequence
 from typing import Any, Union
 
-from . import checks, units
+from . import arguments, checks, units
 from .errors import InvalidRequest
 from .plans import Touches
 from .v1 import source_pb2, types_pb2
@@ -50,6 +50,9 @@ class ImageOptions:
     vertical_fov_deg: float
     normalize: bool = False
 
+    def __post_init__(self) -> None:
+        self.to_proto()  # a mistake is found where it is made
+
     def to_proto(self) -> types_pb2.ImageSpec:
         return types_pb2.ImageSpec(
             width=checks.whole_number("image width", self.width, 1, 2**32 - 1),
@@ -68,6 +71,7 @@ class ImageOptions:
         )
 
 
+@arguments.checked
 def image(width: int = 224, height: int = 224, format: str = "grey", encoding: str = "raw", *, depth: bool = False,
           mask: bool = False, shading_style: str = "shaded", renderer: str = "auto", jpeg_quality: int = 90,
           vertical_fov_deg: float = 45.0, normalize: bool = False) -> ImageOptions:
@@ -108,6 +112,7 @@ def to_image(options: ImageLike) -> ImageOptions:
     )
 
 
+@arguments.checked
 @dataclasses.dataclass(frozen=True)
 class Camera:
     """A camera pose in the object frame.

@@ -127,7 +127,7 @@ class Lease:
         self._ending.set()
         self._thread.join()
         self._ending.clear()
-        self._own.close()
+        self._own.disconnect()
         self._own = self._connection.another()
         self._lost = None
         self._acquire(take=False)
@@ -142,7 +142,7 @@ class Lease:
                         control_pb2.ReleaseLeaseRequest(token=self.token),
                         timeout=max(self._window_s, _SHORTEST_ANSWER_S),
                     )
-            self._own.close()
+            self._own.disconnect()
 
     def _end_renewing(self) -> bool:
         """False if it was not renewed any more."""

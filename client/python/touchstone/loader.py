@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch.utils.data import DataLoader
 
+from . import checks
 from .connection import grpc_was_used
 from .errors import InvalidRequest
 
@@ -31,7 +32,7 @@ class TouchstoneLoader:
         if not options.get("in_order", True):
             raise InvalidRequest("in_order=False gives up the order that a state refers to.")
         self.dataset = dataset
-        self._num_workers = num_workers
+        self._num_workers = checks.whole_number("num_workers", num_workers, 0, 2**16)
         self._options = options
         self._loader: DataLoader | None = None
         # False from the begin of an epoch to its end: then it was broken off.

@@ -27,7 +27,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from .errors import TouchstoneError
+from .measurements import EMULATED
 from .printable import printable
+from .spoken import as_command
 from .v1 import types_pb2
 from .whole_file import check_target, whole_file
 
@@ -153,6 +155,7 @@ class SessionFile:
         self.name = _texts(self._file["session/name"])[0]
         self.provenance = _texts(self._file["session/source"])[0]
         self.calibration = _texts(self._file["session/calibration"])[0]
+        self.emulated = "session/emulated" in self._file and bool(self._file["session/emulated"][0])
         self.fingers, self.touches, self.images = map(int, self._file["session/fingers_touches_images"][...])
 
     def __enter__(self) -> SessionFile:
@@ -173,6 +176,8 @@ class SessionFile:
         for k in range(self.touches):
             touch = types_pb2.RecordedTouch(object=objects[k], up_face=up_faces[k])
             touch.command.ParseFromString(commands[k])
+            if self.emulated:
+                touch.command.covariates[EMULATED] = 1.0
             times = [float(time) for time in columns["contact_time_s"][k]]
             reported = [time for time in times if math.isfinite(time)]
             touch.result.contact_time_s.extend(times)
@@ -303,7 +308,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         counts = export(options.session, options.output, force=options.force)
     except (ExportError, ImportError, OSError, KeyError) as error:
-        print(printable(f"error: {error}"), file=sys.stderr)
+        print(printable(as_command(f"error: {error}")), file=sys.stderr)
         return 1
     print(printable(f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items())))
     return 0

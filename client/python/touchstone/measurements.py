@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from . import arguments
 from .batch import Batch
 from .errors import InvalidRequest
 from .plain_csv import read_csv
@@ -24,6 +25,8 @@ VECTORS = {"target_mm": ("target_x_mm", "target_y_mm", "target_z_mm"),
             "approach": ("approach_x", "approach_y", "approach_z"),
             "lateral": ("lateral_x", "lateral_y", "lateral_z")}
 _HEAD = ["touch", "object", "speed_mm_s", "standoff_mm", *(name for names in VECTORS.values() for name in names)]
+# The covariate that marks what an emulator made.
+EMULATED = "cov_emulated"
 _MORE = ("session_time_s", "round", "face")
 # Lowest and highest value of a column, and what that is in words.
 _RANGES = {"target_mm": (-1e5, 1e5, "a coordinate within 100000 mm of the object's origin"), "standoff_mm": (0, 1e4, "a distance from 0 to 10000 mm"),
@@ -57,6 +60,7 @@ class Row:
     face: int | None = None
 
 
+@arguments.checked
 def read_plan(path: str | os.PathLike[str]) -> list[Row]:
     """The rows of a plan or measurement file that has poses: CSV with the columns of client/python/README.md, mm, us, mm/s.
 
@@ -165,6 +169,7 @@ def number_in(place: str, row: Mapping[str, str], name: str, empty: float | None
         raise InvalidRequest(f"{place}: {name} is '{printable(text)}', not a number.") from None
 
 
+@arguments.checked
 def write_measurements(path: str | os.PathLike[str], rows: Sequence[Row], *, force: bool = False) -> None:
     """Writes a measurement file atomically: it is written beside the path and renamed.
 

@@ -10,11 +10,12 @@ from typing import Any, Callable, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks
+from . import arguments, checks
 
 _ROUNDS = 8
 
 
+@arguments.checked
 class Permutation:
     """The whole numbers 0 to size - 1 in an order that a key decides: the same everywhere, for ever, however large.
 

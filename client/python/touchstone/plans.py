@@ -9,7 +9,7 @@ from typing import Any, Literal, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from . import checks, units
+from . import arguments, checks, units
 from .errors import InvalidRequest
 from .printable import printable
 from .v1 import source_pb2, types_pb2
@@ -48,6 +48,9 @@ class SpherePlan:
             )
         )
 
+    def __post_init__(self) -> None:
+        self.to_proto()  # a mistake is found where it is made
+
     def samples(self, objects: int) -> int:
         """Samples of all touches taken once; 0: there is no end."""
         return 0
@@ -79,6 +82,9 @@ class FacesPlan:
                 ),
             )
         )
+
+    def __post_init__(self) -> None:
+        self.to_proto()  # a mistake is found where it is made
 
     def samples(self, objects: int) -> int:
         """Samples of all touches taken once, for so many objects."""
@@ -186,13 +192,7 @@ class Touches:
 PlanLike = Union[SpherePlan, FacesPlan, Touches]
 
 
-def checked_touches(name: str, given: Any) -> Touches:
-    """What it was given, which must be Touches; InvalidRequest names `name` and says what makes them."""
-    if not isinstance(given, Touches):
-        raise InvalidRequest(f"{name} is {type(given).__name__}; Touches were expected, as touches(), client.plan() or a Row's command give them.")
-    return given
-
-
+@arguments.checked
 def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio: float | None = None,
            max_incidence_deg: float = 90.0) -> SpherePlan:
     """Random approaches from a sphere round the object towards its centre; drawn again until every finger hits.
@@ -207,6 +207,7 @@ def sphere(step_angle_deg: float = 1.0, roll_step_deg: float = 0.0, radius_ratio
     return SpherePlan(step_angle_deg, roll_step_deg, radius_ratio, max_incidence_deg)
 
 
+@arguments.checked
 def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0, spread: float = 0.6,
           standoff_mm: float = 60.0, max_incidence_deg: float = 60.0,
           stroke_beyond_target_mm: float = 30.0) -> FacesPlan:
@@ -228,6 +229,7 @@ def faces(samples_per_face: int = 8, rounds: int = 4, max_tilt_deg: float = 20.0
                      stroke_beyond_target_mm)
 
 
+@arguments.checked
 def touches(rows: Sequence[Mapping[str, Any]] | None = None, **columns: Any) -> Touches:
     """Explicit touches, either rows (a sequence of mappings) or columns; a single value applies to all rows.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Optional, Union
 
 from google.protobuf import json_format
 
+from . import arguments
 from .errors import InvalidRequest
 from .v1 import diagnosis_pb2, types_pb2
 
@@ -32,8 +32,8 @@ def posterior(report: Report | str | os.PathLike[str]) -> types_pb2.ModelPosteri
         raise InvalidRequest(f"{name} says nothing of how sure its model is: a report of diagnose() on touches with poses was "
                              "expected, whose verdict is not check_data or too_little_data.")
     if misfit_us > 0:
-        warnings.warn(f"The model of {name} leaves a misfit of {misfit_us / 1000:.3g} ms on the set that it was fitted to, which "
-                      "these uncertainties do not hold.", UserWarning, stacklevel=3)
+        arguments.warn(f"The model of {name} leaves a misfit of {misfit_us / 1000:.3g} ms on the set that it was fitted to, which "
+                      "these uncertainties do not hold.")
     return found
 
 
@@ -53,6 +53,6 @@ def _of_file(path: str | os.PathLike[str]) -> tuple[types_pb2.ModelPosterior | N
         return (json_format.ParseDict(report["posterior"], types_pb2.ModelPosterior(), ignore_unknown_fields=True),
                 _misfit(budgets.uncertainty))
     except OSError as error:
-        raise InvalidRequest(f"{path}: {error.strerror}.") from None
+        raise InvalidRequest(f"{path}: {error.strerror}; a report was expected, as client.diagnose(...).save(FILE) writes it.") from None
     except (ValueError, json_format.ParseError) as error:
-        raise InvalidRequest(f"{path}: is no report as diagnose() saves it: {error}") from None
+        raise InvalidRequest(f"{path}: is no report, as client.diagnose(...).save(FILE) writes it: {error}") from None

@@ -16,6 +16,7 @@ from .measurements import Row
 from .plans import Touches
 from .printable import printable
 from .report_parts import ComparedValue, DataReport, Detectable, Explanation, Quality, Sessions, Step, UncertaintyBudget, Value, Versus
+from .spoken import as_python
 from .tabular import Rows, Tabular
 from .v1 import diagnosis_pb2
 from .whole_file import check_target, whole_file
@@ -47,12 +48,12 @@ class Report(Tabular):
     @property
     def summary(self) -> str:
         """The answer in a paragraph, as print(report) gives it."""
-        return self.message.summary
+        return as_python(self.message.summary)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What to doubt, a sentence each."""
-        return tuple(self.message.warnings)
+        return tuple(map(as_python, self.message.warnings))
 
     @property
     def data(self) -> tuple[DataReport, ...]:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Callable
 
-from . import checks
+from . import arguments, checks
 from .errors import Refused
 from .lease import holder
 from .measurements import Row
-from .plans import Touches, checked_touches
+from .plans import Touches
 from .v1 import control_pb2, control_pb2_grpc, rig_pb2, rig_pb2_grpc
 
 if TYPE_CHECKING:
@@ -42,6 +41,7 @@ def _ask(object: str, up_face: str) -> None:
     input(f"Put {object} on the fixture with its face {up_face} up, then press Enter. ")
 
 
+@arguments.checked
 class Rig:
     """Client.rig. Moving needs a lease, which is acquired where no `with client.lease()` holds one."""
 
@@ -105,7 +105,7 @@ class Rig:
 
     def check(self, object: str, touches: Touches) -> list[TouchCheck]:
         """Every check that these touches pass before anything moves, without motion."""
-        messages, result = checked_touches("touches", touches).to_messages(), []
+        messages, result = arguments.instance("touches", touches, Touches).to_messages(), []
         for first in range(0, len(messages), _CHECKS_A_REQUEST):
             request = rig_pb2.CheckTouchesRequest(object=object, touches=messages[first:first + _CHECKS_A_REQUEST])
             reply = self._client.call(_RIG, "CheckTouches", request)
@@ -135,7 +135,7 @@ class Rig:
             if not skip_impossible or not groups:
                 raise Refused(f"{said}. Nothing was moved; change the plan"
                               + ("." if not groups else ", or leave them out with skip_impossible=True."))
-            warnings.warn(f"{said}. They are left out.", stacklevel=2)
+            arguments.warn(f"{said}. They are left out.")
         state = self.status()
         objects = list(dict.fromkeys(row.object for row in rows))
         mounted = (state.object, _FACE_NAMES.get(state.up_face, ""))

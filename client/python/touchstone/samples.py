@@ -81,7 +81,7 @@ class Samples(Sequence[Mapping[str, Any]]):
     def close(self) -> None:
         """Closes this thread's connection; the next sample opens one again."""
         if getattr(self._own, "connection", None) is not None:
-            self._own.connection.close()
+            self._own.connection.disconnect()
             self._own.connection = None
 
     def __repr__(self) -> str:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import grpc
 import numpy as np
 
+from . import arguments
 from .errors import InvalidRequest, Refused, from_rpc
-from .measurements import Row, rows_of
+from .measurements import EMULATED, Row, rows_of
 from .plain_csv import parse_csv
 from .plans import Touches
 from .v1 import sessions_pb2, sessions_pb2_grpc
@@ -22,16 +23,13 @@ if TYPE_CHECKING:
     from .client import Client
 
 
-# The covariate that marks what an emulator made.
-EMULATED = "cov_emulated"
-
-
 def check_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", name):
         raise InvalidRequest(f"Session {name!r}: 1 to 64 letters, digits, '_', '-' and '.' were expected.")
     return name
 
 
+@arguments.checked
 def touch_id(session: str, object: str, number: int) -> str:
     """The id under which a physical source journals a touch. The command line uses the same, so either can resume."""
     text = f"{session}/{object}/{number}"
@@ -40,6 +38,7 @@ def touch_id(session: str, object: str, number: int) -> str:
     return f"{session}/{hashlib.sha256(object.encode()).hexdigest()[:16]}/{number}"
 
 
+@arguments.checked
 class Session:
     """Made by Client.session(). Holds the lease, where the source needs one, from `with` to its end.
 

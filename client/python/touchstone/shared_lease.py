@@ -91,4 +91,4 @@ class SharedLease(Lease):
         if self._slot.leave(self._worker):
             super().release()
         elif self._end_renewing():
-            self._own.close()
+            self._own.disconnect()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 
-from . import checks, units
+from . import arguments, checks, units
 from .errors import InvalidRequest
 from .images import ImageLike, image as default_image, to_image
 from .models import ModelLike, model_ref
@@ -42,7 +41,7 @@ def requested_columns(names: Sequence[str]) -> list[str]:
 
 def specification(objects: str | Sequence[str], plan: PlanLike | None = None, *, samples: int | None = None,
                   seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
-                  touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                  touch_interval_s: float = 0.0, columns: str | Sequence[str] | None = None,
                   image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
                   models_from: PosteriorLike = None) -> source_pb2.DatasetSpec:
     """The message; arguments as in Client.dataset(). samples is resolved, so that the size is known here."""
@@ -113,9 +112,9 @@ def _warn_of_faces_without_touches(plan: PlanLike, samples: int, objects: int) -
     touches = -(-samples // objects)
     reached = -(-touches // plan.samples_per_face)
     if reached < 6 and -(-touches // 6) < plan.samples_per_face:
-        warnings.warn(f"samples={samples} of {objects} objects are {touches} touches of each, which reach {reached} of the 6 faces: "
+        arguments.warn(f"samples={samples} of {objects} objects are {touches} touches of each, which reach {reached} of the 6 faces: "
                       f"faces(samples_per_face={plan.samples_per_face}) makes all touches of one face before the next. With "
-                      f"samples_per_face={-(-touches // 6)} they reach all.", stacklevel=4)
+                      f"samples_per_face={-(-touches // 6)} they reach all.")
 
 
 def resolve_batch_size(spec: source_pb2.DatasetSpec, batch_size: int | None) -> int:

@@ -34,7 +34,7 @@ from typing import Any
 import torch
 from torch.utils.data import IterableDataset, get_worker_info
 
-from . import checks
+from . import arguments, checks
 from .client import Client
 from .connection import Connection, Targets, parse_targets
 from .dataset import Dataset, fingerprint
@@ -55,6 +55,8 @@ __all__ = ["KeyedShuffle", "TouchstoneDataset", "TouchstoneLoader", "TouchstoneS
 
 # Workers that compare what their sources serve; further ones share places.
 _FINGERPRINTS = 256
+_MOST_RANKS = 2**20
+_MOST_EPOCHS = 2**31
 
 
 def epoch_seed(seed: int, epoch: int) -> int:
@@ -69,6 +71,7 @@ def epoch_seed(seed: int, epoch: int) -> int:
     return int.from_bytes(digest[:8], "little")
 
 
+@arguments.checked
 class TouchstoneDataset(IterableDataset):
     """An IterableDataset of batches (dicts of tensors), or of samples with batched=False.
 
@@ -82,7 +85,7 @@ class TouchstoneDataset(IterableDataset):
 
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
-                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                 touch_interval_s: float = 0.0, columns: str | Sequence[str] | None = None,
                  image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
                  models_from: PosteriorLike = None, batch_size: int | None = None,
                  start: int = 0, stop: int | None = None, batched: bool = True, rank: int | None = None,
@@ -114,11 +117,10 @@ class TouchstoneDataset(IterableDataset):
         self._spec_digest = digest(spec)
         self._seed = spec.seed
         self.batch_size = resolve_batch_size(spec, batch_size)
-        self.stop = spec.samples if stop is None else checks.whole_number("stop", stop, 0, spec.samples)
-        self.start = checks.whole_number("start", start, 0, self.stop)
+        self.start, self.stop = checks.part(start, stop, spec.samples)
         self.batched = batched
         default_rank, default_ranks = ranks_of_this_job()
-        self.ranks = default_ranks if ranks is None else checks.whole_number("ranks", ranks, 1, 2**20)
+        self.ranks = default_ranks if ranks is None else checks.whole_number("ranks", ranks, 1, _MOST_RANKS)
         self.rank = checks.whole_number("rank", default_rank if rank is None else rank, 0, self.ranks - 1)
         self.whole_rounds = whole_rounds
         self.new_samples_each_epoch = new_samples_each_epoch
@@ -144,7 +146,7 @@ class TouchstoneDataset(IterableDataset):
 
     def set_epoch(self, epoch: int) -> None:
         """Begins that epoch at the next iteration. Needed only for a DataLoader with workers made without loader()."""
-        self._begin_at(checks.whole_number("epoch", epoch, 0, 2**31), self.start, 0)
+        self._begin_at(checks.whole_number("epoch", epoch, 0, _MOST_EPOCHS), self.start, 0)
 
     def __len__(self) -> int:
         """Batches, or samples with batched=False, that this rank sees in a whole epoch."""
@@ -211,9 +213,11 @@ class TouchstoneDataset(IterableDataset):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Goes on there at the next iteration. The number of workers may differ, and, if all ranks had been given
         equally many batches, the number of ranks too."""
-        if state.get("version") != 1:
-            raise InvalidRequest(f"The state has version {state.get('version')!r}; this package reads 1.")
-        if state["specification"] != self._spec_digest:
+        if not isinstance(state, dict) or state.get("version") != 1:
+            said = f"The state has version {state.get('version')!r}" if isinstance(state, dict) else f"The state is {arguments.shown(state)}"
+            raise InvalidRequest(f"{said}; what state_dict() gave was expected, version 1.")
+        epoch, index, skip, served = self._place_in(state)
+        if state.get("specification") != self._spec_digest:
             raise InvalidRequest(
                 "The state was saved with another specification (objects, plan, seed, model, columns, ...); make the "
                 "dataset with the same arguments."
@@ -227,12 +231,29 @@ class TouchstoneDataset(IterableDataset):
         self._worker_loaded = bool(here)
         if here:
             self._worker_begin = self._shared_begin.clone()
-            self._begin_at(state["epoch"], state["next_index"], state["skip_samples"])
+            self._begin_at(epoch, index, skip)
             return
         self._fingerprints.zero_()
-        if state["served"]:
-            self._fingerprints[0] = torch.tensor(list(bytes.fromhex(state["served"])), dtype=torch.uint8)
-        self._begin_at(state["epoch"], state["next_index"], state["skip_samples"])
+        if served:
+            self._fingerprints[0] = torch.tensor(list(served), dtype=torch.uint8)
+        self._begin_at(epoch, index, skip)
+
+    def _place_in(self, state: dict[str, Any]) -> tuple[int, int, int, bytes]:
+        """Epoch, next index, samples to skip and what was served, of a state; InvalidRequest names the entry that cannot be."""
+        missing = [name for name in ("epoch", "next_index", "skip_samples", "served") if name not in state]
+        if missing:
+            raise InvalidRequest(f"The state has no {', '.join(missing)}; what state_dict() gave was expected, as it was.")
+        # The state of an epoch's end lies behind its last sample, by up to a batch of each rank and worker.
+        behind = _MOST_RANKS * self.batch_size
+        try:
+            served = bytes.fromhex(state["served"])
+        except (TypeError, ValueError):
+            served = b"?"
+        if len(served) not in (0, self._fingerprints.shape[1]):
+            raise InvalidRequest(f"The state's served is {arguments.shown(state['served'])}; 64 hexadecimal digits or none were expected.")
+        return (checks.whole_number("The state's epoch", state["epoch"], 0, _MOST_EPOCHS),
+                checks.whole_number("The state's next_index", state["next_index"], self.start, self.stop + behind),
+                checks.whole_number("The state's skip_samples", state["skip_samples"], 0, self.batch_size - 1), served)
 
     def _begin_at(self, epoch: int, index: int, skip: int) -> None:
         self._begin.copy_(torch.tensor([epoch, index, skip], dtype=torch.int64))

@@ -8,7 +8,7 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset, Sampler
 
-from . import checks
+from . import arguments, checks
 from .client import Client
 from .connection import Connection, Targets
 from .errors import InvalidRequest
@@ -25,6 +25,7 @@ from .torch_support import ranks_of_this_job, rows, tensors
 __all__ = ["KeyedShuffle", "TouchstoneSamples"]
 
 
+@arguments.checked
 class TouchstoneSamples(Dataset):
     """A map-style dataset: `dataset[i]` is sample i, a dict of tensors.
 
@@ -39,7 +40,7 @@ class TouchstoneSamples(Dataset):
 
     def __init__(self, target: Targets | Client, objects: str | Sequence[str], plan: PlanLike | None = None, *,
                  samples: int | None = None, seed: int = 0, model: ModelLike = None, speed_mm_s: float | None = None,
-                 touch_interval_s: float = 0.0, columns: Sequence[str] | None = None,
+                 touch_interval_s: float = 0.0, columns: str | Sequence[str] | None = None,
                  image: ImageLike | None = None, max_draws: int = 0, uncertainty: PosteriorLike = None,
                  models_from: PosteriorLike = None, retry_for_s: float = RETRY_FOR_S):
         """Arguments as in Client.samples(), and:
@@ -65,6 +66,7 @@ class TouchstoneSamples(Dataset):
         return list(rows(tensors(self.samples[list(indices)])))
 
 
+@arguments.checked
 class KeyedShuffle(Sampler):
     """The indices of a dataset in an order that a seed and the epoch decide, whatever the number of workers.
 

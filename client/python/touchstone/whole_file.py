@@ -24,7 +24,7 @@ def check_target(path: str | os.PathLike[str], force: bool) -> None:
     if not target.absolute().parent.is_dir():
         raise NotFound(f"{target}: the folder {target.absolute().parent} is not there; make it, or choose another.")
     if target.exists() and not force:
-        raise InvalidRequest(f"{target} exists; replace it with force=True (of a command: --force), or choose another name.")
+        raise InvalidRequest(f"{target} exists; replace it with force=True, or choose another name.")
 
 
 @contextlib.contextmanager
@@ -44,7 +44,8 @@ def whole_file(path: str | os.PathLike[str], mode: str = "w", **options: Any) ->
             os.fchmod(file.fileno(), _mode_of(name))
             os.fsync(file.fileno())
         os.replace(part, name)
-    except BaseException:
+    except BaseException as error:
+        _name(error, part, os.fspath(path))
         with contextlib.suppress(OSError):
             os.unlink(part)
         raise
@@ -73,10 +74,21 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[pathlib.Path]:
             shutil.rmtree(before)
         else:
             part.rename(name)
-    except BaseException:
+    except BaseException as error:
+        _name(error, str(part), os.fspath(path))
         shutil.rmtree(part, ignore_errors=True)
         raise
     _sync(str(name.parent), os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _name(error: BaseException, part: str, path: str) -> None:
+    """Lets an error name what was asked for, and not the hidden file or folder that takes its place when it is whole."""
+    error.args = tuple(one.replace(part, path) if isinstance(one, str) else one for one in error.args)
+    if isinstance(error, OSError):
+        for name in ("filename", "filename2"):
+            file = getattr(error, name)
+            if isinstance(file, (str, os.PathLike)):
+                setattr(error, name, os.fspath(file).replace(part, path))
 
 
 def _sync(path: str, flags: int) -> None:

@@ -9,6 +9,7 @@
 #include "client/report/terminal/terminal_parts.h"
 #include "client/report/words/error_scale.h"
 #include "client/report/words/words.h"
+#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {
@@ -17,19 +18,12 @@ using TextCell = TextLayout::Cell;
 
 constexpr int kMaxColumns = 3;  // sessions beside one another; of more, the two that differ most
 
-// Digits that the error leaves.
-std::string ValueWithError(double value, double std_error) {
-  if (!(std_error > 0)) return Number(value, 3);
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std_error))), 0, 9);
-  return absl::StrFormat("%.*f +- %.*f", decimals, value, decimals, std_error);
-}
-
 std::string ChangeInWords(const v1::ComparedValue& value, double p) {
   switch (value.change()) {
     case v1::ComparedEffect::CHANGED:
       return absl::StrCat("changed by ", value.difference() > 0 ? "+" : "",
-                          ValueWithError(value.difference(), value.std_error()), " ", value.unit(), " (p ",
-                          Probability(p), ")");
+                          touchstone::ValueWithError(value.difference(), value.std_error()), " ",
+                          value.unit(), " (p ", Probability(p), ")");
     case v1::ComparedEffect::UNCHANGED:
       return absl::StrCat("unchanged, within ",
                           Number(std::max(std::abs(value.lower()), std::abs(value.upper())), 2), " ",
@@ -55,9 +49,9 @@ const v1::SessionValue* OfSession(const v1::ComparedValue& value, int session) {
 
 std::string InSession(const v1::ComparedValue& value, int session) {
   const v1::SessionValue* one = OfSession(value, session);
-  return one == nullptr
-             ? "-"
-             : absl::StrCat(ValueWithError(one->value(), one->std_error()), one->outside() ? " !" : "");
+  return one == nullptr ? "-"
+                        : absl::StrCat(touchstone::ValueWithError(one->value(), one->std_error()),
+                                       one->outside() ? " !" : "");
 }
 
 void AddErrors(const v1::Report& report, TextLayout* out) {
@@ -91,7 +85,9 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
   const auto column = [&](double at) {
     return std::clamp(static_cast<int>(std::lround((at - low) / (high - low) * (kChart - 1))), 0, kChart - 1);
   };
-  out->Label(value.between_sessions() > 0 ? "Scatters" : "Steady");
+  out->Label(value.change() == v1::ComparedEffect::CHANGED     ? "Changed"
+             : value.change() == v1::ComparedEffect::UNCHANGED ? "Unchanged"
+                                                               : "Cannot say");
   out->Paragraph(
       absl::StrCat(NameOfValue(effect, value), ", ", value.unit(),
                    value.between_sessions() > 0
@@ -107,7 +103,7 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
     }
     chart[column(one.value())] = one.outside() ? 'X' : 'o';
     rows.push_back({{SessionLabel(report, static_cast<int>(one.session()))},
-                    {ValueWithError(one.value(), one.std_error()), true},
+                    {touchstone::ValueWithError(one.value(), one.std_error()), true},
                     {chart, false, one.outside() ? TextLayout::kBad : TextLayout::kBar},
                     {one.outside() ? "outside" : ""}});
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/report/words/error_scale.h"
+#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {
@@ -63,7 +64,7 @@ JointTable ValuesOfBoth(const v1::Report& report) {
       std::vector<std::string>& row = table.rows.emplace_back();
       row = {absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ", p.finger(),
                           p.object().empty() ? "" : " of ", p.object()),
-             absl::StrCat(Number(p.value(), 4), " +- ", Number(p.std_error(), 2), unit)};
+             absl::StrCat(touchstone::ValueWithError(p.value(), p.std_error()), unit)};
       for (const v1::DataReport& data : report.data()) {
         const auto own = std::find_if(p.alone().begin(), p.alone().end(),
                                       [&](const v1::ErrorAlone& one) { return one.kind() == data.kind(); });

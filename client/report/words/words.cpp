@@ -17,6 +17,7 @@
 
 #include "client/report/words/error_scale.h"
 #include "server/base/files/file_label.h"
+#include "server/base/text/value_text.h"
 #include "server/base/units.h"
 
 namespace touchstone::client {
@@ -24,58 +25,18 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-// Decimals that show `digits` significant digits of `value`.
-int DecimalsFor(double value, int digits) {
-  if (!(std::abs(value) > 0) || !std::isfinite(value)) return 0;
-  // The exponent after rounding: 0.9996 with three digits is 1.00.
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.*e", digits - 1, value);
-  const int exponent = std::atoi(std::strchr(text, 'e') + 1);
-  return std::clamp(digits - 1 - exponent, 0, 9);
-}
-
-// "3e-9" rather than "3e-09".
-std::string ShortExponent(std::string text) {
-  const size_t e = text.find('e');
-  if (e == std::string::npos) return text;
-  size_t digit = e + 2;
-  while (digit + 1 < text.size() && text[digit] == '0') text.erase(digit, 1);
-  if (text[e + 1] == '+') text.erase(e + 1, 1);
-  return text;
-}
-
-// Decimals of a value so that its error shows one digit, or two if that digit is a 1.
-int DecimalsForError(double error) {
-  const int decimals = DecimalsFor(error, 1);
-  return error * std::pow(10.0, decimals) < 1.95 ? DecimalsFor(error, 2) : decimals;
-}
-
 }  // namespace
 
-std::string Fixed(double value, int decimals) {
-  if (std::isnan(value)) return "n/a";
-  std::string text = absl::StrFormat("%.*f", decimals, value);
-  if (text[0] == '-' && text.find_first_of("123456789") == std::string::npos) text.erase(0, 1);
-  return text;
+std::string Number(double value, int digits) {
+  return RoundedNumber(value, digits);
 }
 
-std::string Number(double value, int digits) {
-  if (std::isnan(value)) return "n/a";
-  if (std::isinf(value)) return value > 0 ? "infinite" : "-infinite";
-  const double size = std::abs(value);
-  if (size == 0) return "0";
-  if (size < 1e-4 || size >= 1e7) {
-    char text[40];
-    std::snprintf(text, sizeof(text), "%.*g", digits, value);
-    return ShortExponent(text);
-  }
-  return Fixed(value, DecimalsFor(value, digits));
+std::string Fixed(double value, int decimals) {
+  return FixedNumber(value, decimals);
 }
 
 std::string Tick(double value) {
-  char text[40];
-  std::snprintf(text, sizeof(text), "%.6g", value);
-  return ShortExponent(text);
+  return RoundNumber(value);
 }
 
 std::string Count(uint64_t count) {
@@ -143,17 +104,7 @@ std::string ValueWithError(const v1::ParameterValue& value) {
     scale = time.per_us;
     unit = time.symbol;
   }
-  const double error = value.std_error() * scale;
-  std::string text;
-  if (error > 0 && std::isfinite(error) && error < 1e7 && error > 1e-9) {
-    const int decimals = DecimalsForError(error);
-    // Beyond seven digits nobody reads a value, however small its error.
-    const int shown = std::min(decimals, DecimalsFor(std::max(std::abs(value.value() * scale), error), 7));
-    text = absl::StrCat(Fixed(value.value() * scale, shown), " +- ",
-                        shown == decimals ? Fixed(error, decimals) : Number(error, 2));
-  } else {
-    text = error == 0 ? Tick(value.value() * scale) : Number(value.value() * scale);
-  }
+  const std::string text = touchstone::ValueWithError(value.value() * scale, value.std_error() * scale);
   return unit.empty() ? text : absl::StrCat(text, " ", unit);
 }
 

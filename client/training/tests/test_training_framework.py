@@ -49,9 +49,15 @@ def training(*arguments, check=None):
 def test_a_mistake_is_named_in_words(tmp_path, monkeypatch, arguments, says):
     monkeypatch.setattr(sys, "argv", ["touchstone.training", *arguments, "--out", str(tmp_path)])
     told = io.StringIO()
-    with contextlib.redirect_stderr(told), pytest.raises(SystemExit) as raised:
+    with contextlib.redirect_stderr(told), pytest.raises((SystemExit, touchstone.InvalidRequest)) as raised:
         command.main()
-    assert raised.value.code not in (0, None) and says in f"{told.getvalue()}{raised.value.code}"
+    assert getattr(raised.value, "code", 2) != 0 and says in f"{told.getvalue()}{raised.value}"
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence_with_an_exit_status():
+    done = subprocess.run([sys.executable, "-m", "touchstone.training", "curvature_histograms", "--out", "/proc/x"], capture_output=True, text=True,
+                          check=False)
+    assert (done.returncode, done.stderr) == (2, "touchstone: error: /proc/x: No such file or directory\n")
 
 
 def test_an_experiment_runs_to_its_report(tmp_path, monkeypatch):
@@ -87,6 +93,17 @@ def test_an_emulated_rig_is_not_called_real(tmp_path):
 def test_a_source_that_does_not_answer_is_named_without_a_traceback(tmp_path):
     done = training("curvature_histograms", "--server", "127.0.0.1:1", "--quick", "--out", tmp_path)
     assert done.returncode != 0 and "127.0.0.1:1" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_an_interrupted_run_ends_without_a_traceback_and_with_the_exit_status_of_one(tmp_path):
+    command_line = [sys.executable, "-m", "touchstone.training", "curvature_histograms", "--out", str(tmp_path)]
+    with subprocess.Popen(command_line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        begun = process.stderr.readline()
+        assert begun.startswith("1/1 curvature_histograms: ")
+        process.send_signal(signal.SIGINT)
+        said, told = process.communicate(timeout=120)
+    assert (process.returncode, said, told) == (130, "", "")
+    assert not (tmp_path / "report.json").exists()
 
 
 def counting(tmp_path, monkeypatch, run=None):

@@ -12,6 +12,7 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/base/text/text.h"
+#include "server/base/text/value_text.h"
 #include "server/diagnosis/boards/board_search.h"
 #include "server/diagnosis/engine/fit/fitted_values.h"
 #include "server/diagnosis/engine/fit/resampled_covariance.h"
@@ -45,8 +46,7 @@ engine::Quality QualityOf(const BoardSet& set, const LensFit& lens, const LensFi
 
 std::string InWords(const BoardLens& lens) {
   const auto value = [](const char* name, double value_px, double error_px) {
-    return error_px > 0 ? absl::StrFormat("%s %.2f +- %.2f", name, value_px, error_px)
-                        : absl::StrFormat("%s %.2f", name, value_px);
+    return absl::StrCat(name, " ", ValueWithError(value_px, error_px));
   };
   const session::CameraIntrinsics& c = lens.camera;
   std::string words = absl::StrCat(
@@ -139,8 +139,8 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
                       set.camera_is_guess ? ", which is a guess (no camera.yaml)" : "");
   for (const engine::LadderStep& step : diagnosis.steps) {
     const auto value = [](const engine::ParameterEstimate& p) {
-      return absl::StrFormat("%s%s%s %.5g +- %.2g", p.name, p.entry.empty() ? "" : " ", p.entry, p.value,
-                             p.std_error);
+      return absl::StrCat(p.name, p.entry.empty() ? "" : " ", p.entry, " ",
+                          ValueWithError(p.value, p.std_error));
     };
     absl::StrAppend(&words, " With ", step.effect, " (",
                     absl::StrJoin(step.parameters, ", ",

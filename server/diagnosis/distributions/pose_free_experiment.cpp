@@ -43,12 +43,10 @@ absl::Status PoseFreeExperiment::Prepare() {
     std::nth_element(speeds.begin(), speeds.begin() + speeds.size() / 2, speeds.end());
     speed_m_s = speeds[speeds.size() / 2];
   }
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(input, set.origin, set.objects));
   const int count = static_cast<int>(set.objects.size());
   for (int o = 0; o < count; ++o) {
     const auto surface = input.surfaces.find(set.objects[o]);
-    if (surface == input.surfaces.end())
-      return absl::InvalidArgumentError(absl::StrCat(set.origin, ": object '", set.objects[o],
-                                                     "' has no mesh: give --mesh ", set.objects[o], "=FILE"));
     objects.push_back(
         AssumePlan(set, o, surface->second, speed_m_s, std::max(24, kMaxMeasuredTouches / count)));
   }

@@ -18,13 +18,7 @@ absl::Status CheckPhotographs(const DiagnosisInput& input) {
   if (input.images == nullptr) return absl::InvalidArgumentError("the input holds no photographs");
   const session::ImageSet& set = *input.images;
   if (set.size() == 0) return absl::InvalidArgumentError(absl::StrCat(set.origin, ": no photograph"));
-  std::vector<std::string> missing;
-  for (const std::string& object : set.objects)
-    if (input.surfaces.count(object) == 0) missing.push_back(object);
-  if (!missing.empty())
-    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '",
-                                            absl::StrJoin(missing, "', '"), "'; give it with --mesh ",
-                                            missing[0], "=FILE, or all of a folder with --mesh-dir DIR"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(input, set.origin, set.objects));
   const size_t pixels = static_cast<size_t>(set.camera.width_px) * set.camera.height_px;
   for (const session::PhotographRow& row : set.photographs)
     if (row.pixels.size() != pixels * row.channels)

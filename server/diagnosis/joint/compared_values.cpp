@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "server/base/numbers/normal.h"
+#include "server/diagnosis/joint/between_sessions.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
 
 constexpr double kChangedErrors = 3;    // of a single entry, where its effect has changed
+constexpr double kRunErrors = 3;        // between a session and the mean of those before it
 constexpr double kGradientStep = 1e-4;  // over the parameter's scale
 
 // How far each entry of a description moves with each of the session's values; the entries' unit over SI.
@@ -107,10 +109,9 @@ class GroupDescriber {
     }
     for (size_t e = 0; e < compared->entries.size(); ++e) {
       ComparedValue& value = compared->entries[e];
-      if (state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors))
-        value.change = ValueChange::kChanged;
-      else if (choice_.IsCompared(g) && value.std_error > 0)
-        value.change = Unmoved(sessions, e, value) ? ValueChange::kUnchanged : ValueChange::kCannotSay;
+      const bool apart =
+          state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors);
+      SetVerdict(apart, choice_.IsCompared(g) && value.std_error > 0 && Unmoved(sessions, e, value), &value);
     }
   }
 
@@ -146,7 +147,53 @@ class GroupDescriber {
   const SessionChoice& choice_;
 };
 
+// A session at a bound, without a standard error, is in a run of its own unless its value is that of the one before.
+std::vector<SessionRun> RunsOf(const ComparedValue& value) {
+  std::vector<SessionRun> runs;
+  for (size_t session = 0; session < value.by_session.size(); ++session) {
+    if (!value.by_session[session]) continue;
+    const SessionEstimate own = {value.by_session[session]->value, value.by_session[session]->std_error};
+    if (!runs.empty()) {
+      SessionEstimate& mean = runs.back().mean;
+      if (std::abs(own.value - mean.value) <= kRunErrors * std::hypot(own.std_error, mean.std_error)) {
+        runs.back().sessions.push_back(static_cast<int>(session));
+        if (!(own.std_error > 0 && mean.std_error > 0)) continue;
+        const double weight = 1 / (own.std_error * own.std_error);
+        const double before = 1 / (mean.std_error * mean.std_error);
+        mean = {(before * mean.value + weight * own.value) / (before + weight),
+                1 / std::sqrt(before + weight)};
+        continue;
+      }
+    }
+    runs.push_back({{static_cast<int>(session)}, own});
+  }
+  return runs;
+}
+
 }  // namespace
+
+void SetVerdict(bool apart, bool steady, ComparedValue* value) {
+  std::vector<SessionEstimate> known;
+  std::vector<int> sessions;
+  for (size_t session = 0; session < value->by_session.size(); ++session) {
+    const std::optional<engine::ParameterEstimate>& estimate = value->by_session[session];
+    if (!estimate || !(estimate->std_error > 0)) continue;  // not measured, or at a bound
+    known.push_back({estimate->value, estimate->std_error});
+    sessions.push_back(static_cast<int>(session));
+  }
+  const ControlChart chart = MakeControlChart(known);
+  value->limits.assign(value->by_session.size(), std::nullopt);
+  bool outside = false;
+  for (size_t i = 0; i < chart.limits.size(); ++i) {
+    value->limits[sessions[i]] = chart.limits[i];
+    outside = outside || chart.limits[i].outside;
+  }
+  value->change = apart                ? ValueChange::kChanged
+                  : steady && !outside ? ValueChange::kUnchanged
+                                       : ValueChange::kCannotSay;
+  value->scatter = apart && known.size() >= kMinForScatter ? chart.inside.std_deviation : 0;
+  value->runs = apart ? RunsOf(*value) : std::vector<SessionRun>();
+}
 
 ComparedEffect DescribeGroup(const SessionEvidence& evidence, const SessionChoice& choice, int group) {
   return GroupDescriber(evidence, choice).Compared(group);

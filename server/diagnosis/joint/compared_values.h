@@ -5,14 +5,23 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/joint/between_sessions.h"
 #include "server/diagnosis/joint/session_choice.h"
 
 namespace touchstone::diagnosis::joint {
 
+// What is said of a value, and all that is said of it: where it lies outside its limits and how much it scatters follow the
+// verdict (SetVerdict).
 enum class ValueChange {
-  kUnchanged,  // the 95 % interval holds no change that would move the rows by more than their noise
+  kUnchanged,  // the 95 % interval holds no change that would move the rows by more than their noise; no session is outside
   kChanged,
-  kCannotSay,  // it holds such changes, and no change at all
+  kCannotSay,  // all else
+};
+
+// Sessions one after the other that agree on a value within kRunErrors standard errors, and their mean.
+struct SessionRun {
+  std::vector<int> sessions;
+  SessionEstimate mean;
 };
 
 // One entry of a parameter in every session, in the unit of files.
@@ -24,7 +33,17 @@ struct ComparedValue {
   // less the earlier one's, with its 95 % interval.
   int from = 0, to = 0;
   double difference = 0, std_error = 0, lower = 0, upper = 0;
+  // By session, of four or more that measure it: what the others let expect of it.
+  std::vector<std::optional<ControlLimits>> limits;
+  // Of a value that changed: the standard deviation between three sessions or more that are within their limits, beyond the
+  // standard errors, and where it changed. Of all others 0 and empty.
+  double scatter = 0;
+  std::vector<SessionRun> runs;
 };
+
+// Decides what is said of a value from its values in the sessions, which are set. `apart`: the data speak for values of its
+// own in each session; `steady`: no difference in its interval would move rows by more than their noise.
+void SetVerdict(bool apart, bool steady, ComparedValue* value);
 
 struct ComparedEffect {
   std::string effect, object;  // object: of values that differ by object; empty: of all

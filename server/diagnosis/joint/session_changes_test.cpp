@@ -106,6 +106,49 @@ TEST(SessionChanges, AChangeOfTenStandardErrorsIsFoundAndNamed) {
   }
 }
 
+// All that is said of a value of three sessions agrees: what is unchanged neither scatters nor has a session outside, and
+// what changed is said to have changed in the session in which it did.
+TEST(SessionChanges, WhatIsSaidOfAValueOfThreeSessionsIsOneVerdict) {
+  const double low = 0.8e-3, high = low + 20 * kStdErrorM;
+  const std::vector<std::pair<std::vector<double>, std::vector<std::vector<int>>>> truths = {
+      {{low, low, low}, {}},
+      {{low, low, high}, {{0, 1}, {2}}},
+      {{low, high, high}, {{0}, {1, 2}}},
+      {{low, high, low}, {{0}, {1}, {2}}}};
+  for (const auto& [values, runs] : truths)
+    for (uint64_t seed = 1; seed <= 20; ++seed) {
+      std::vector<Truth> sessions;
+      for (const double value : values) sessions.push_back({{"object_push", value}});
+      const SessionChanges found = Find(sessions, seed);
+      const ComparedEffect* compared = Named(found, "object_push");
+      ASSERT_NE(compared, nullptr);
+      const ComparedValue& value = compared->entries[0];
+      EXPECT_EQ(value.change, runs.empty() ? ValueChange::kUnchanged : ValueChange::kChanged);
+      EXPECT_EQ(value.scatter > 0, !runs.empty()) << seed;
+      std::vector<std::vector<int>> told;
+      for (const SessionRun& run : value.runs) told.push_back(run.sessions);
+      EXPECT_EQ(told, runs) << seed;
+    }
+}
+
+// Many sessions without a verdict of a change: one of them outside its limits is not called unchanged.
+TEST(SessionChanges, AValueWithASessionOutsideItsLimitsIsNotCalledUnchanged) {
+  ComparedValue value;
+  for (int session = 0; session < 6; ++session) {
+    engine::ParameterEstimate estimate;
+    estimate.value = session == 4 ? 1.5 : 1;
+    estimate.std_error = 0.1;
+    value.by_session.emplace_back(estimate);
+  }
+  SetVerdict(/*apart=*/false, /*steady=*/true, &value);
+  EXPECT_TRUE(value.limits[4]->outside);
+  EXPECT_EQ(value.change, ValueChange::kCannotSay);
+  value.by_session[4]->value = 1.1;
+  SetVerdict(/*apart=*/false, /*steady=*/true, &value);
+  EXPECT_FALSE(value.limits[4]->outside);
+  EXPECT_EQ(value.change, ValueChange::kUnchanged);
+}
+
 TEST(SessionChanges, AnEffectThatCameBetweenIsAbsentBefore) {
   const SessionChanges found = Find({{}, {{"oblique_slip", 0.5e-3}}, {{"oblique_slip", 0.5e-3}}}, 1);
   const ComparedEffect* compared = Named(found, "oblique_slip");

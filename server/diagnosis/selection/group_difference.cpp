@@ -13,6 +13,7 @@
 #include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/text/readable_time.h"
+#include "server/base/text/value_text.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/session/repeats.h"
 #include "server/diagnosis/selection/session/round_structure.h"
@@ -304,11 +305,9 @@ class DifferenceSearch {
     std::vector<std::string> values;
     for (const engine::ParameterEstimate& value : found.more)
       if (std::abs(value.value) > kClearErrors * value.std_error)
-        values.push_back(
-            absl::StrCat(value.name, value.entry.empty() ? "" : " ", value.entry,
-                         absl::StrFormat(value.std_error < 10 ? " %+.4g +- %.1g" : " %+.0f +- %.0f",
-                                         value.value, value.std_error),
-                         value.unit.empty() ? "" : " ", value.unit));
+        values.push_back(absl::StrCat(
+            value.name, value.entry.empty() ? "" : " ", value.entry, value.value > 0 ? " +" : " ",
+            ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
     std::string words =
         absl::StrCat("Something was other ", absl::StrJoin(places, ", or "), ": ", found.effect,

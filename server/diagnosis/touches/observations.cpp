@@ -32,13 +32,7 @@ absl::Status CheckInput(const DiagnosisInput& input) {
         set.origin, ": only differences between fingers are compared, and there is but one finger"));
   if (set.size() == 0)
     return absl::InvalidArgumentError(absl::StrCat(set.origin, ": the file has a header and no touch"));
-  std::vector<std::string> missing;
-  for (const std::string& object : set.objects)
-    if (input.surfaces.count(object) == 0) missing.push_back(object);
-  if (!missing.empty())
-    return absl::NotFoundError(absl::StrCat(set.origin, ": no mesh for object '",
-                                            absl::StrJoin(missing, "', '"), "'; give it with --mesh ",
-                                            missing[0], "=FILE, or all of a folder with --mesh-dir DIR"));
+  TOUCHSTONE_RETURN_IF_ERROR(CheckMeshes(input, set.origin, set.objects));
   return absl::OkStatus();
 }
 

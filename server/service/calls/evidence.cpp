@@ -11,6 +11,7 @@
 #include "server/base/status.h"
 #include "server/base/text/text.h"
 #include "server/geometry/files/mesh_file.h"
+#include "server/geometry/missing_mesh.h"
 #include "server/model/provenance.h"
 #include "server/service/core/convert.h"
 #include "server/service/core/sent_model.h"
@@ -21,8 +22,7 @@
 namespace touchstone::service {
 namespace {
 
-constexpr int kMaxAlso = 64;     // model files
-constexpr size_t kMaxNamed = 5;  // objects in a message
+constexpr int kMaxAlso = 64;  // model files
 constexpr size_t kMaxAlsoBytes = 1 << 20;
 
 absl::Status SetTouches(absl::StatusOr<session::MeasurementSet> set, diagnosis::DiagnosisInput* input) {
@@ -186,16 +186,7 @@ absl::Status FindSurfaces(const v1::Evidence& message, const Resources& resource
   for (const auto& [name, file] : files) known.push_back(name);
   for (const auto& [name, object] : resources.objects.all())
     if (files.count(name) == 0) known.push_back(name);
-  const std::string others =
-      missing.size() == 1
-          ? ""
-          : absl::StrCat(" (nor have ", missing.size() - 1, " others: ",
-                         absl::StrJoin(missing.begin() + 1,
-                                       missing.begin() + std::min(missing.size(), kMaxNamed), ", "),
-                         missing.size() > kMaxNamed ? ", ..." : "", ")");
-  return absl::NotFoundError(absl::StrCat(first_place, ": column object: '", missing[0], "' has no mesh",
-                                          others, "; give it with --mesh ", missing[0],
-                                          "=FILE or --mesh-dir FOLDER", DidYouMean(missing[0], known)));
+  return geometry::MissingMesh(absl::StrCat(first_place, ": column object: "), missing, known);
 }
 
 absl::Status ReadAlso(const v1::Evidence& message, const Resources& resources,

@@ -2,6 +2,7 @@
 
 #include <absl/container/flat_hash_map.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include <filesystem>
 
@@ -252,7 +253,8 @@ absl::Status WriteImageSetFiles(const v1::ImageSetFiles& files, const std::strin
   if (status.ok())
     status = is_there ? MoveFiles(NamesOf(files, others), part, place) : RenameSynced(part, place);
   fs::remove_all(part, error);
-  return status;
+  // What was asked for is named, and not the folder that takes its place.
+  return absl::Status(status.code(), absl::StrReplaceAll(status.message(), {{part, place}}));
 }
 
 absl::Status WriteImageSet(const ImageSet& set, const std::string& folder) {

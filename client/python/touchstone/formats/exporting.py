@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator
 
 from ..command import did_you_mean
 from ..errors import InvalidRequest, NotFound, Refused
-from ..mcap import ExportError, export as export_recording
+from ..mcap import ExportError, SessionFile, export as export_recording
 from ..whole_file import check_target, whole_folder
 from . import card, hdf5, lerobot, mcap, parquet, sessions, webdataset
 from .datasets import DatasetFolder, open_dataset
-from .table import Table, Values, sha256_of
+from .table import Table, Values, need, sha256_of
 
 FORMATS: dict[str, Callable[[Table, pathlib.Path], None]] = {
     "webdataset": webdataset.write_webdataset, "hdf5": hdf5.write_hdf5, "parquet": parquet.write_parquet,
@@ -140,6 +140,14 @@ def _write_table(table: Table, folder: pathlib.Path, write: Callable[[Table, pat
     return table.rows
 
 
+def _session_file(path: pathlib.Path) -> SessionFile:
+    need("h5py", "export of HDF5")
+    try:
+        return SessionFile(path)
+    except ExportError as error:
+        raise InvalidRequest(str(error)) from None
+
+
 def _write_recording(path: pathlib.Path, folder: pathlib.Path, to: str) -> int:
     """A session with all that its journal has: the writers that sessions have anyway."""
     table: Table | None = None
@@ -149,7 +157,8 @@ def _write_recording(path: pathlib.Path, folder: pathlib.Path, to: str) -> int:
     with sessions.session_as(path, ".h5") if path.suffix != ".h5" else contextlib.nullcontext(path) as file:
         if to == "hdf5":
             shutil.copyfile(file, folder / "session.h5")
-            rows = table.rows if table else 0
+            with _session_file(file) as recorded:
+                rows = table.rows if table else recorded.touches + recorded.images
         else:
             try:
                 rows = export_recording(file, folder / "session.mcap")["/touch"]

@@ -29,7 +29,7 @@ class OpenQuestions(InvalidRequest):
 
     def __init__(self, path: pathlib.Path, questions: list[str]):
         self.questions = questions
-        super().__init__(f"{path}: what is not said is not guessed. Answer in the mapping file (--map):\n" + "\n".join(
+        super().__init__(f"{path}: what is not said is not guessed. Answer in the mapping file (mapping=FILE):\n" + "\n".join(
             f"  - {question}" for question in questions))
 
 

@@ -43,6 +43,16 @@ _UNIT_ENDS = (("_mm_s", "mm/s"), ("_m_s", "m/s"), ("_mm", "mm"), ("_cm", "cm"), 
 _ENTRIES = ("touchstone", "touches", "touch", "object", "contact_time", "contacts", "pose", "target", "approach", "lateral", "standoff", "speed",
             "time", "joints", "covariates")
 _MOST_CANDIDATES = 6
+# How this program itself names the fields of a touch, by the kind of the topic: in the messages of a session's export, and in tables
+# and the channel /touch of other exports. They can mean one thing only.
+_RECORDED_TOUCH = "touchstone.v1.RecordedTouch"
+_OWN_TOPICS = (_RECORDED_TOUCH, "touchstone.Touch")
+_OWN_MESSAGES = {"object": ("object",), "contact_time": ("result.contact_time_s",), "target": ("command.target_m",),
+                 "approach": ("command.approach",), "lateral": ("command.lateral",), "standoff": ("command.standoff_m",),
+                 "speed": ("command.speed_m_s",), "time": ("result.measured.session_time_s",)}
+_OWN_COLUMNS = {"object": ("object_name",), "contact_time": ("contact_time_us",), "target": ("target_mm",), "approach": ("approach",),
+                "lateral": ("lateral",), "standoff": ("standoff_mm",), "speed": ("speed_mm_s",), "touch": ("touch",),
+                "time": ("session_time_s",)}
 
 
 @dataclasses.dataclass
@@ -85,6 +95,9 @@ class Mapping:
         if names == [""]:
             return self.recording.topics[""]
         wanted = self.entries.get("touches")
+        own = [name for name, topic in self.recording.topics.items() if topic.kind in _OWN_TOPICS]
+        if wanted is None and len(own) == 1:
+            return self.recording.topics[own[0]]
         if wanted is None:
             described = [f"{name} ({topic.kind}, {topic.rows} messages)" for name, topic in self.recording.topics.items()]
             self.questions.ask("touches: which topic has one message per touch? There are " + "; ".join(described) + ".")
@@ -150,12 +163,10 @@ class Mapping:
         """What is named exactly as this program itself names it can mean one thing only."""
         if self.touches is None:
             return None
-        own = {"object": ("object_name",), "contact_time": ("contact_time_us",), "target": ("target_mm",), "approach": ("approach",),
-               "lateral": ("lateral",), "standoff": ("standoff_mm",), "speed": ("speed_mm_s",), "touch": ("touch",),
-               "time": ("session_time_s",)}.get(entry, ())
+        own = (_OWN_MESSAGES if self.touches.kind == _RECORDED_TOUCH else _OWN_COLUMNS).get(entry, ())
         for name in own:
             for spelled in (name, f"observation.{name}"):
-                if spelled in self.touches.fields:
+                if all(part in self.touches.fields for part in self.expanded(self.touches, spelled)):
                     return {"field": spelled, **({"unit": unit} if (unit := _unit_of(spelled)) and units else {})}
         if required:
             self._ask_field(entry, what, self.touches, counts, words, text)

@@ -107,6 +107,9 @@ def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
         for field in value.DESCRIPTOR.fields:
             if field.message_type is None or field.label == field.LABEL_REPEATED or value.HasField(field.name):
                 part = getattr(value, field.name)
+                if field.message_type is not None and field.message_type.GetOptions().map_entry:
+                    yield from _flat(dict(part), f"{path}.{field.name}" if path else field.name)
+                    continue
                 yield from _flat(list(part) if field.label == field.LABEL_REPEATED else part, f"{path}.{field.name}" if path else field.name)
     elif not isinstance(value, (bytes, bytearray, memoryview)):
         names = getattr(value, "__slots__", None) or getattr(value, "__dict__", {})

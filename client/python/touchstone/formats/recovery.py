@@ -69,7 +69,7 @@ def recover(source: str | os.PathLike[str], out: str | os.PathLike[str], *, forc
     if path.is_dir():
         raise Refused(f"{path}: a dataset is not recovered but resumed. {_AGAIN}; `touchstone dataset verify` says which shards are whole.")
     if target.exists() and (not force or target.samefile(path)):
-        raise InvalidRequest(f"{target} exists; replace it with --force, or choose another name. What is recovered is never replaced.")
+        raise InvalidRequest(f"{target} exists; replace it with force=True, or choose another name. What is recovered is never replaced.")
     return _of_kind(path)[1](path, target)
 
 

@@ -25,9 +25,10 @@ _DESCRIPTION = """Recognises objects by touches and photographs that are streame
 and what goes beyond them. Writes report.html, report.json and figures (SVG)."""
 
 
-def main() -> int:
+def main(words: list[str] | None = None) -> int:
+    words = sys.argv[1:] if words is None else words
     known = experiments()
-    options = _parse(known)
+    options = _parse(known, words)
     settings = _settings(options)
     wanted = [each for each in known if "all" in options.experiments or each.name in options.experiments]
     settings.out.mkdir(parents=True, exist_ok=True)
@@ -44,8 +45,8 @@ def main() -> int:
     # A run of some experiments leaves those of earlier runs in the report.
     now = {each.name: result for each, result in done}
     shown = [(each, now.get(each.name) or _finished(each, settings)) for each in known]
-    command = "python -m touchstone.training " + shlex.join(sys.argv[1:])
-    page = report.write(settings, [(each, result) for each, result in shown if result is not None], left_out, command,
+    called = "python -m touchstone.training " + shlex.join(words)
+    page = report.write(settings, [(each, result) for each, result in shown if result is not None], left_out, called,
                         datetime.date.today().isoformat())
     for each, result in done:
         print(f"{each.title}: {result.words[0]}")
@@ -55,7 +56,7 @@ def main() -> int:
     return 0
 
 
-def _parse(known: list[Experiment]) -> argparse.Namespace:
+def _parse(known: list[Experiment], words: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m touchstone.training", description=_DESCRIPTION,
                                      epilog="Experiments: " + "; ".join(f"{e.name}: {e.title}" for e in known))
     parser.add_argument("experiments", nargs="+", metavar="EXPERIMENT", choices=["all", *(e.name for e in known)],
@@ -70,24 +71,24 @@ def _parse(known: list[Experiment]) -> argparse.Namespace:
     parser.add_argument("--backbone", type=pathlib.Path, metavar="FILE.onnx", help="image network, trained on others' pictures")
     parser.add_argument("--everyday", type=pathlib.Path, metavar="FOLDER", help="the ten everyday meshes")
     parser.add_argument("--again", action="store_true", help="also what is finished: without it a run goes on where it ended")
-    return parser.parse_args()
+    return parser.parse_args(words)
 
 
 def _settings(options: argparse.Namespace) -> Settings:
     for name, path in (("--backbone", options.backbone), ("--everyday", options.everyday)):
         if path is not None and not path.exists():
-            sys.exit(f"{name} {path}: no such {'file' if name == '--backbone' else 'folder'}")
+            raise touchstone.InvalidRequest(f"{name} {path}: no such {'file' if name == '--backbone' else 'folder'}")
     if options.backbone is not None:
         try:
             Backbone(options.backbone, workers=1)  # a file that will not do is refused now, not an hour later
         except NoNetwork as error:
-            sys.exit(str(error))
+            raise touchstone.InvalidRequest(str(error)) from None
     if options.rig_is_real and not options.rig:
-        sys.exit("--rig-is-real needs --rig HOST:PORT: the rig that is started otherwise is emulated")
+        raise touchstone.InvalidRequest("--rig-is-real needs --rig HOST:PORT: the rig that is started otherwise is emulated")
     if options.rig:
         _check_rig(options.rig, options.rig_is_real)
     if options.seeds is not None and options.seeds < 2:
-        sys.exit(f"--seeds {options.seeds}: at least 2 are needed for an interval")
+        raise touchstone.InvalidRequest(f"--seeds {options.seeds}: at least 2 are needed for an interval")
     return Settings(options.out, options.quick, options.seeds or (3 if options.quick else 10), options.seed, options.server,
                     options.rig, options.rig_is_real, options.backbone, options.everyday)
 
@@ -96,10 +97,11 @@ def _check_rig(target: str, is_real: bool) -> None:
     """What the source itself says: whether it is a rig, and whether an emulator stands in for its arm."""
     with touchstone.connect(target) as client:
         if not client.is_physical:
-            sys.exit(f"--rig {target}: this is a {client.describe().kind} source, which has no arm; the address of a touchstone-gateway was "
-                     "expected. A simulator is named with --server")
+            raise touchstone.InvalidRequest(f"--rig {target}: this is a {client.describe().kind} source, which has no arm; the address of a "
+                                            "touchstone-gateway was expected. A simulator is named with --server")
         if is_real and client.rig.status().emulated:
-            sys.exit(f"--rig-is-real: the gateway at {target} says that its rig is emulated; its data measure nothing, and are called emulated")
+            raise touchstone.InvalidRequest(f"--rig-is-real: the gateway at {target} says that its rig is emulated; its data measure nothing, "
+                                            "and are called emulated")
 
 
 def _run(experiment: Experiment, context: Context, again: bool) -> Result:
@@ -137,7 +139,4 @@ def _digest(settings: Settings) -> str:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except touchstone.TouchstoneError as error:
-        sys.exit(f"touchstone.training: {error}")
+    command.run(main)

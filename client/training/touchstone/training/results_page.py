@@ -14,6 +14,8 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from touchstone import command
+
 from .experiment import experiments
 
 # What goes beyond the seed stands first.
@@ -91,15 +93,15 @@ def _wrapped(text: str, width: int = 128) -> list[str]:
     return [*lines, line]
 
 
-def main() -> None:
+def main(words: list[str]) -> None:
     parser = argparse.ArgumentParser(prog="python -m touchstone.training.results_page", description=__doc__)
     parser.add_argument("reports", nargs="+", type=pathlib.Path, metavar="REPORT.json")
     parser.add_argument("--note", required=True, help="when, at which commit and on what machine")
     parser.add_argument("--earlier", type=pathlib.Path, metavar="RESULTS.md", help="whose sections stay where no report has the experiment")
-    options = parser.parse_args()
+    options = parser.parse_args(words)
     earlier = options.earlier.read_text(encoding="utf-8") if options.earlier else ""
     print(page([json.loads(path.read_text()) for path in options.reports], options.note, earlier), end="")
 
 
 if __name__ == "__main__":
-    main()
+    command.run(main)

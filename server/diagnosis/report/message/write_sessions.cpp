@@ -1,7 +1,6 @@
 #include "server/diagnosis/report/message/write_sessions.h"
 
 #include "server/base/units.h"
-#include "server/diagnosis/joint/between_sessions.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
@@ -30,8 +29,6 @@ joint::ValueChange ChangeOf(const joint::ComparedEffect& effect) {
 
 void WriteBySession(const joint::ComparedValue& value, const std::vector<int>& taking_part,
                     v1::ComparedValue* message) {
-  std::vector<joint::SessionEstimate> known;
-  std::vector<v1::SessionValue*> written;
   for (size_t session = 0; session < value.by_session.size(); ++session) {
     if (!value.by_session[session]) continue;
     const engine::ParameterEstimate& estimate = *value.by_session[session];
@@ -39,18 +36,12 @@ void WriteBySession(const joint::ComparedValue& value, const std::vector<int>& t
     to->set_session(static_cast<uint32_t>(taking_part[session]));
     to->set_value(estimate.value);
     to->set_std_error(estimate.std_error);
-    if (!(estimate.std_error > 0)) continue;  // at a bound
-    known.push_back({estimate.value, estimate.std_error});
-    written.push_back(to);
+    if (!value.limits[session]) continue;
+    to->set_limit_lower(value.limits[session]->lower);
+    to->set_limit_upper(value.limits[session]->upper);
+    to->set_outside(value.limits[session]->outside);
   }
-  if (known.size() < joint::kMinForScatter) return;
-  const joint::ControlChart chart = joint::MakeControlChart(known);
-  message->set_between_sessions(chart.inside.std_deviation);
-  for (size_t i = 0; i < chart.limits.size(); ++i) {
-    written[i]->set_limit_lower(chart.limits[i].lower);
-    written[i]->set_limit_upper(chart.limits[i].upper);
-    written[i]->set_outside(chart.limits[i].outside);
-  }
+  message->set_between_sessions(value.scatter);
 }
 
 void WriteEffect(const joint::ComparedEffect& effect, const std::vector<int>& taking_part,

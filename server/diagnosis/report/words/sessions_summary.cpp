@@ -6,12 +6,16 @@
 #include <absl/strings/str_join.h>
 
 #include "server/base/files/file_label.h"
+#include "server/base/text/value_text.h"
 #include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr double kMinP = 1e-300;
+constexpr size_t kMaxRuns =
+    4;  // of a value that changed; of more, the two sessions that differ most are named
+constexpr size_t kMaxNames = 3;  // of a run; of more, its first and its last
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
   return absl::StrCat(effect.effect, " ", value.name,
@@ -19,16 +23,36 @@ std::string ValueName(const joint::ComparedEffect& effect, const engine::Paramet
                       effect.object.empty() ? "" : absl::StrCat(" of ", effect.object));
 }
 
+// A value from session to session: those that agree together, of many runs the two that differ most.
+std::string CourseInWords(const Sessions& sessions, const std::vector<DataReport>& data,
+                          const joint::ComparedEffect& effect, const joint::ComparedValue& value) {
+  const engine::ParameterEstimate& named = *value.by_session[value.from];
+  std::vector<joint::SessionRun> runs = value.runs;
+  const bool many = runs.size() < 2 || runs.size() > kMaxRuns;
+  if (many) {
+    runs.clear();
+    for (const int session : {value.from, value.to})
+      runs.push_back({{session}, {value.by_session[session]->value, value.by_session[session]->std_error}});
+  }
+  std::vector<std::string> parts;
+  for (const joint::SessionRun& run : runs) {
+    std::vector<std::string> names;
+    for (const int session : run.sessions) names.push_back(SessionName(data, sessions.taking_part[session]));
+    const size_t count = names.size();
+    parts.push_back(absl::StrCat(ValueWithError(run.mean.value, run.mean.std_error), " ", named.unit, " in ",
+                                 count > kMaxNames ? absl::StrCat(names.front(), " to ", names.back())
+                                                   : absl::StrJoin(names, " and ")));
+  }
+  return absl::StrCat(ValueName(effect, named), " from ", absl::StrJoin(parts, " to "),
+                      many && value.runs.size() > kMaxRuns ? ", and in others between" : "");
+}
+
 std::string ChangedInWords(const Sessions& sessions, const std::vector<DataReport>& data,
                            const joint::ComparedEffect& effect) {
   std::vector<std::string> changes;
   for (const joint::ComparedValue& value : effect.entries) {
     if (value.change != joint::ValueChange::kChanged) continue;
-    const engine::ParameterEstimate &from = *value.by_session[value.from], &to = *value.by_session[value.to];
-    changes.push_back(absl::StrFormat(
-        "%s from %.4g +- %.2g %s in %s to %.4g +- %.2g %s in %s", ValueName(effect, from), from.value,
-        from.std_error, from.unit, SessionName(data, sessions.taking_part[value.from]), to.value,
-        to.std_error, to.unit, SessionName(data, sessions.taking_part[value.to])));
+    changes.push_back(CourseInWords(sessions, data, effect, value));
   }
   std::string words = absl::StrFormat("Changed: %s (by chance with p = %.1g).", absl::StrJoin(changes, "; "),
                                       std::max(effect.p, kMinP));

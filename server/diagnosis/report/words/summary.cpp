@@ -9,6 +9,7 @@
 
 #include "server/base/text/readable_time.h"
 #include "server/base/text/text.h"
+#include "server/base/text/value_text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/words/distributions_summary.h"
 #include "server/diagnosis/selection/session/time_structure.h"
@@ -194,8 +195,8 @@ void AddTouchWarnings(const DataReport& data, std::vector<std::string>* warnings
 std::string ValueInWords(const engine::ParameterEstimate& value) {
   std::string name = value.name;
   if (!value.entry.empty()) name += " " + value.entry;
-  return absl::StrFormat("%s %.4g +- %.2g%s%s", name, value.value, value.std_error,
-                         value.unit.empty() ? "" : " ", value.unit);
+  return absl::StrCat(name, " ", ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ",
+                      value.unit);
 }
 
 std::string ErrorInWords(DataKind kind, double error) {
