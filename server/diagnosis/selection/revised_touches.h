@@ -1,4 +1,4 @@
-// Which touches take part in the search for an explanation: some leave and some come back as it goes on.
+// Which touches take part in the search for an explanation: some leave as it goes on.
 #pragma once
 
 #include <vector>
@@ -6,7 +6,6 @@
 #include <absl/status/statusor.h>
 
 #include "server/diagnosis/selection/selection.h"
-#include "server/diagnosis/touches/noise/noise_search.h"
 
 namespace touchstone::diagnosis::selection {
 
@@ -17,10 +16,8 @@ void LeaveOutWild(Workspace* workspace);
 void LeaveOutRows(const GroupDifference& group, touches::Observations* observations);
 
 // Where the better model says that a finger all but misses an edge, outliers, touches of little worth: they leave or
-// count less. Touches that the given model places beside the object or at an edge, and `fit` does not, come back where it
-// fails to predict them. Returns whether anything changed; `weights`: by row of the set.
-absl::StatusOr<bool> ReviseTouches(const engine::Fit& fit, const touches::NoiseFindings& noise,
-                                   const std::vector<int>& outliers, Workspace* workspace,
-                                   std::vector<double>* weights);
+// count less. Returns whether anything changed; `weights`: by row of the set.
+absl::StatusOr<bool> ReviseTouches(const SelectionResult& found, const std::vector<int>& outliers,
+                                   Workspace* workspace, std::vector<double>* weights);
 
 }  // namespace touchstone::diagnosis::selection

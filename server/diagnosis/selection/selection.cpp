@@ -213,8 +213,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
     TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
     if (pass + 1 == kPasses) break;
     const std::vector<int>& outliers = pass == 0 ? result.noise.farthest_outliers : result.noise.outliers;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised,
-                                ReviseTouches(result.fit, result.noise, outliers, workspace, &weights));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised, ReviseTouches(result, outliers, workspace, &weights));
     if (!revised) break;
     before = result.without_formula.model;
   }

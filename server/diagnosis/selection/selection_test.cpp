@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "server/base/test_tier.h"
-#include "server/diagnosis/selection/revised_touches.h"
 #include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
@@ -57,31 +56,6 @@ TEST(SelectExplanation, NamesACompetingEffectThatTheseDataCannotTellFromTheStep)
   ASSERT_GE(selected.result.steps.size(), 1u);
   ASSERT_FALSE(selected.result.steps[0].competing.empty());
   EXPECT_TRUE(selected.result.steps[0].competing[0].equivalent);
-}
-
-// Touches at an edge of the object where the given model has it tell where it lies, once it is known to lie elsewhere.
-TEST(SelectExplanation, TakesTouchesBackThatTheFittedModelFailsToPredict) {
-  touches::HiddenRig rig;
-  rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
-  const Selected selected = SelectFor(touches::MakeTestInput(rig));
-  Workspace& workspace = *selected.workspace;
-  touches::Observations& o = *workspace.observations;
-  // Of a fit that has seen them all, two touches stand for such as left at an edge.
-  const std::vector<int> left = {20, 75};
-  for (const int k : left) touches::LeaveOut(&o, k, touches::kEdgeReason);
-  const engine::Fit& fit = selected.result.fit;
-  std::vector<double> weights;
-  const touches::NoiseFindings noise;
-  absl::StatusOr<bool> revised = ReviseTouches(fit, noise, {}, &workspace, &weights);
-  ASSERT_TRUE(revised.ok()) << revised.status();
-  EXPECT_FALSE(*revised) << "the fit predicts them";
-  EXPECT_FALSE(o.used[20]);
-  for (const int k : left) o.time_s[static_cast<size_t>(k) * o.fingers] += 0.02;
-  revised = ReviseTouches(fit, noise, {}, &workspace, &weights);
-  ASSERT_TRUE(revised.ok()) << revised.status();
-  EXPECT_TRUE(*revised);
-  EXPECT_TRUE(o.used[20] && o.used[75]);
-  for (const int k : touches::LeftOutFor(o, touches::kEdgeReason)) EXPECT_TRUE(k != 20 && k != 75);
 }
 
 TEST(SelectExplanation, LeavesOutliersOutWithTheirReason) {

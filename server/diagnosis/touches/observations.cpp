@@ -147,17 +147,6 @@ std::vector<int> LeftOutFor(const Observations& observations, const std::string&
   return found == observations.unused.end() ? std::vector<int>() : found->second;
 }
 
-void TakeBack(Observations* observations, int k, const std::string& reason) {
-  const auto found = observations->unused.find(reason);
-  if (found == observations->unused.end()) return;
-  std::vector<int>& touches = found->second;
-  const auto place = std::find(touches.begin(), touches.end(), k);
-  if (place == touches.end()) return;
-  touches.erase(place);
-  observations->used[k] = 1;
-  if (touches.empty()) observations->unused.erase(found);
-}
-
 double PauseS(const Observations& o, int k) {
   if (!o.set->has_session_time || o.previous[k] < 0) return 0;
   return o.set->session_time_s[o.row[k]] - o.set->session_time_s[o.row[o.previous[k]]];

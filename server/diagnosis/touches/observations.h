@@ -60,7 +60,4 @@ void LeaveOut(Observations* observations, int k, const std::string& reason);
 // Touches that were left out for the reason.
 std::vector<int> LeftOutFor(const Observations& observations, const std::string& reason);
 
-// Takes touch k, which was left out for the reason, in again.
-void TakeBack(Observations* observations, int k, const std::string& reason);
-
 }  // namespace touchstone::diagnosis::touches
