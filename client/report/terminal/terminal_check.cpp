@@ -16,7 +16,7 @@ namespace {
 
 using TextCell = TextLayout::Cell;
 
-constexpr double kSomePower =
+constexpr double kMinPower =
     0.1;                        // power at the usual size, from which an effect is no blind spot at any size
 constexpr double kPower = 0.8;  // that found_from and told_from mean
 constexpr int kWideColumns = 100;  // from where what rigs show has a column
@@ -111,7 +111,7 @@ void AddBlindSpots(const v1::Report& report, TextLayout* out) {
     if (value.power_at_typical() >= kPower) continue;
     blind.push_back(
         value.has_found_from() ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
-        : value.power_at_typical() >= kSomePower
+        : value.power_at_typical() >= kMinPower
             ? absl::StrCat(effect, " for sure (", Share(value.power_at_typical()), " at the usual size)")
             : absl::StrCat(effect, " at any size"));
   }
