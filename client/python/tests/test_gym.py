@@ -189,6 +189,16 @@ def test_wrong_use_is_refused_in_words(make):
         together.step(np.array([0, 99]))
 
 
+@pytest.mark.parametrize("num_envs", [0, 2])
+def test_a_closed_environment_stays_closed(make, num_envs):
+    env = make(num_envs).unwrapped
+    env.reset(seed=1)
+    env.close()
+    for use in (lambda: env.reset(seed=1), lambda: env.step(np.zeros(num_envs, int) if num_envs else 0)):
+        with pytest.raises(touchstone.Refused, match="The environment is closed; make a new one"):
+            use()
+
+
 def test_the_example_learns(server):
     package = os.path.dirname(os.path.dirname(touchstone.__file__))
     done = subprocess.run([sys.executable, EXAMPLE, server.target, "--episodes", "600"], capture_output=True, text=True, timeout=120,

@@ -92,7 +92,7 @@ def test_a_folder_that_is_missing_is_named(tmp_path, write):
 def test_an_mcap_file_that_is_there_is_refused_by_the_function_as_by_the_command(tmp_path):
     (tmp_path / "a.mcap").write_text("precious")
     pytest.importorskip("mcap")
-    with pytest.raises(mcap.ExportError, match=r"a\.mcap exists; replace it with force=True"):
+    with pytest.raises(touchstone.InvalidRequest, match=r"a\.mcap exists; replace it with force=True"):
         mcap.export(tmp_path / "a.h5", tmp_path / "a.mcap")
 
 

@@ -49,7 +49,7 @@ from . import checks
 from .box_touches import box_touches
 from .client import Client, connect
 from .connection import Targets
-from .errors import InvalidRequest
+from .errors import InvalidRequest, Refused
 from .models import ModelLike
 from .plans import Touches, sphere
 from .samples import Samples
@@ -108,10 +108,17 @@ class _Table:
         self.observation_space = spaces.Box(0.0, 1.0, (self.touches, 1 + 2 * self.fingers), np.float32)
         self.actions = self.touches + len(self.objects)
         self.action_space: spaces.Discrete[np.int64] = spaces.Discrete(self.actions)
+        self._closed = False
 
     def close(self) -> None:
+        self._closed = True
         self._samples.close()
         self._finalizer()
+
+    def check_open(self) -> None:
+        """Raises Refused after close()."""
+        if self._closed:
+            raise Refused("The environment is closed; make a new one with gymnasium.make().")
 
     def touch(self, objects: NDArray[np.integer[Any]], touches: NDArray[np.integer[Any]],
               repeats: NDArray[np.integer[Any]]) -> NDArray[np.float32]:
@@ -160,6 +167,7 @@ class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode: an object is drawn, or options={"object": name} names it. InvalidRequest for a name that is not among them."""
+        self._table.check_open()
         super().reset(seed=seed)
         self._object = _drawn(self._table, self.np_random, options)
         self._made = 0
@@ -169,6 +177,7 @@ class RecogniseEnv(gymnasium.Env["NDArray[np.float32]", np.int64]):
     def step(self, action: int | np.integer[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """A touch or an answer: observation, reward, terminated, truncated, info. InvalidRequest without an episode, or for an action
         out of range."""
+        self._table.check_open()
         if self._object is None:
             raise InvalidRequest("The episode is over, or none has begun; call reset().")
         if not self.action_space.contains(action):
@@ -229,6 +238,7 @@ class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[An
               options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode in every environment; observations are (num_envs, touches, 1 + 2 * fingers). `seed`: one number, or one
         per environment."""
+        self._table.check_open()
         seeds: list[int | None] = [None] * self.num_envs
         if isinstance(seed, (int, np.integer)):
             seeds = [int(seed) + k for k in range(self.num_envs)]
@@ -246,6 +256,7 @@ class RecogniseVectorEnv(VectorEnv["NDArray[np.float32]", "NDArray[np.integer[An
     def step(self, actions: NDArray[np.integer[Any]]) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_],
                                                                NDArray[np.bool_], dict[str, Any]]:
         """One step of every environment, for (num_envs,) whole numbers: one request to the source. InvalidRequest as of RecogniseEnv."""
+        self._table.check_open()
         if self._ended is None:
             raise InvalidRequest("No episode has begun; call reset().")
         actions = np.asarray(actions)

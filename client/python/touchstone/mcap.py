@@ -16,20 +16,17 @@ Channels, each with its schema in the file, times in Unix nanoseconds:
 
 from __future__ import annotations
 
-import argparse
 import base64
 import hashlib
 import json
 import math
 import os
-import sys
 from collections.abc import Iterator
 from typing import Any
 
-from .errors import TouchstoneError
+from . import command
+from .errors import InvalidRequest
 from .measurements import EMULATED
-from .printable import printable
-from .spoken import as_command
 from .v1 import types_pb2
 from .whole_file import check_target, whole_file
 
@@ -55,8 +52,8 @@ COMPRESSED_IMAGE = {
 }
 
 
-class ExportError(Exception):
-    """What went wrong, on which file, and what would be right."""
+class ExportError(InvalidRequest):
+    """What is wrong with the session's file, and what would be right."""
 
 
 def time_of(unix_s: float) -> dict[str, int]:
@@ -231,14 +228,12 @@ class SessionFile:
 
 
 def export(session: str | os.PathLike[str], output: str | os.PathLike[str], *, force: bool = False) -> dict[str, int]:
-    """Writes the MCAP file, whole or not at all; how many messages each channel got. ExportError says what is wrong.
+    """Writes the MCAP file, whole or not at all; how many messages each channel got. ExportError for a file that is no session,
+    InvalidRequest for an output that exists or cannot be.
 
     force: replace a file that is there.
     """
-    try:
-        check_target(output, force)
-    except TouchstoneError as error:
-        raise ExportError(str(error)) from None
+    check_target(output, force)
     try:
         from mcap.writer import Writer
     except ImportError as error:
@@ -297,22 +292,21 @@ def _write(source: SessionFile, writer: Any) -> dict[str, int]:
     return counts
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """The command `python -m touchstone.mcap`; returns its exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m touchstone.mcap", formatter_class=argparse.RawDescriptionHelpFormatter, description=__doc__)
-    parser.add_argument("session", help="an HDF5 file of touchstone session export")
-    parser.add_argument("-o", "--output", required=True, help="the MCAP file")
-    parser.add_argument("--force", action="store_true", help="replace a file that exists")
-    options = parser.parse_args(arguments)
-    try:
-        counts = export(options.session, options.output, force=options.force)
-    except (ExportError, ImportError, OSError, KeyError) as error:
-        print(printable(as_command(f"error: {error}")), file=sys.stderr)
-        return 1
-    print(printable(f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items())))
-    return 0
+def main(words: list[str]) -> None:
+    """The command `python -m touchstone.mcap`."""
+    parser = command.CommandParser(
+        "mcap", "Writes an exported session as an MCAP file, the log format of Foxglove and ROS 2 (https://mcap.dev).",
+        "touchstone session export session.db -o session.h5\npython -m touchstone.mcap session.h5 -o session.mcap")
+    parser.prog = "python -m touchstone.mcap"
+    parser.add_argument("session", metavar="SESSION", help="An HDF5 file of touchstone session export")
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help="The MCAP file")
+    parser.add_output_options(force=True)
+    options = parser.parse(words)
+    counts = export(options.session, options.output, force=options.force)
+    if options.json:
+        print(json.dumps(counts, indent=2))
+    command.log(options.quiet, f"{options.output}: " + ", ".join(f"{count} {topic}" for topic, count in counts.items()))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command.run(main)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 from ..command import did_you_mean
 from ..errors import InvalidRequest, NotFound, Refused
-from ..mcap import ExportError, SessionFile, export as export_recording
+from ..mcap import SessionFile, export as export_recording
 from ..whole_file import check_target, whole_folder
 from . import card, hdf5, lerobot, mcap, parquet, sessions, webdataset
 from .datasets import DatasetFolder, open_dataset
@@ -142,10 +142,7 @@ def _write_table(table: Table, folder: pathlib.Path, write: Callable[[Table, pat
 
 def _session_file(path: pathlib.Path) -> SessionFile:
     need("h5py", "export of HDF5")
-    try:
-        return SessionFile(path)
-    except ExportError as error:
-        raise InvalidRequest(str(error)) from None
+    return SessionFile(path)
 
 
 def _write_recording(path: pathlib.Path, folder: pathlib.Path, to: str) -> int:
@@ -160,10 +157,7 @@ def _write_recording(path: pathlib.Path, folder: pathlib.Path, to: str) -> int:
             with _session_file(file) as recorded:
                 rows = table.rows if table else recorded.touches + recorded.images
         else:
-            try:
-                rows = export_recording(file, folder / "session.mcap")["/touch"]
-            except ExportError as error:
-                raise InvalidRequest(str(error)) from None
+            rows = export_recording(file, folder / "session.mcap")["/touch"]
     if table is None:
         table = Table(path.stem, rows, (), (), {"kind": "exported session", "file": path.name, "sha256": sha256_of(path)})
     layout = {"hdf5": "`session.h5` is what `touchstone session export` writes: every row of the journal, with checksums, in SI units.",
