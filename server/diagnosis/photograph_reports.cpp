@@ -114,6 +114,7 @@ report::Diagnosis DescribedPhotographs(const DiagnosisInput& input, const Diagno
                                        images::PhotographDiagnosis* found) {
   residuals::DescribePhotographs(expectation, input.seed, context.pool, found);
   report::Diagnosis diagnosis = report::FromPhotographs(*found, *input.images);
+  report::SetCopiesAside(expectation.photographs.copies, &diagnosis);
   for (std::string& warning : report::DataWarnings(diagnosis.data[0]))
     diagnosis.warnings.push_back(std::move(warning));
   diagnosis.summary = report::Summarize(diagnosis);

@@ -224,9 +224,6 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& all, const model::
   const auto began = std::chrono::steady_clock::now();
   BoardDiagnosis diagnosis;
   const BoardSet set = WithoutCopies(all, &diagnosis.copies);
-  if (!diagnosis.copies.empty())
-    diagnosis.warnings.push_back(
-        absl::StrCat("the same picture as another, counted once: ", absl::StrJoin(diagnosis.copies, ", ")));
   diagnosis.model_name = model.name;
   diagnosis.model_hash = model.Hash();
   diagnosis.pictures = static_cast<int>(set.pictures.size());

@@ -52,19 +52,45 @@ image::PhotoRequest RequestOf(const session::ImageSet& set, int row, const Photo
   return request;
 }
 
-void FindPosesOfPhotographs(Photographs* photographs) {
-  std::map<std::array<double, 10>, int> poses;
-  for (int k = 0; k < photographs->size(); ++k) {
-    const session::CameraPlacement& camera = photographs->set->photographs[photographs->row[k]].commanded;
-    std::array<double, 10> key = {static_cast<double>(photographs->object[k])};
-    for (int axis = 0; axis < 3; ++axis) {
-      key[1 + axis] = camera.eye_m[axis];
-      key[4 + axis] = camera.at_m[axis];
-      key[7 + axis] = camera.up[axis];
-    }
-    photographs->pose.push_back(poses.emplace(key, static_cast<int>(poses.size())).first->second);
+// Equal for photographs of one object from one commanded place.
+using PoseKey = std::array<double, 10>;
+PoseKey PoseKeyOf(const session::PhotographRow& row) {
+  PoseKey key = {static_cast<double>(row.object)};
+  for (int axis = 0; axis < 3; ++axis) {
+    key[1 + axis] = row.commanded.eye_m[axis];
+    key[4 + axis] = row.commanded.at_m[axis];
+    key[7 + axis] = row.commanded.up[axis];
   }
+  return key;
+}
+
+void FindPosesOfPhotographs(Photographs* photographs) {
+  std::map<PoseKey, int> poses;
+  for (const int row : photographs->row)
+    photographs->pose.push_back(
+        poses.emplace(PoseKeyOf(photographs->set->photographs[row]), static_cast<int>(poses.size()))
+            .first->second);
   photographs->poses = static_cast<int>(poses.size());
+}
+
+// Takes photographs out whose pose and pixels are those of one before: as repeats they would show less noise than there is.
+void TakeCopiesOut(Photographs* photographs) {
+  const std::vector<session::PhotographRow>& all = photographs->set->photographs;
+  std::map<PoseKey, std::vector<int>> distinct;
+  const auto is_copy = [&](int row) {
+    std::vector<int>& others = distinct[PoseKeyOf(all[row])];
+    for (const int other : others)
+      if (all[other].pixels == all[row].pixels) return true;
+    others.push_back(row);
+    return false;
+  };
+  std::vector<int> kept;
+  for (const int row : photographs->row)
+    if (is_copy(row))
+      photographs->copies.push_back(all[row].file);
+    else
+      kept.push_back(row);
+  photographs->row = std::move(kept);
 }
 
 // From repeats where there are any, else from neighbouring pixels.
@@ -113,6 +139,7 @@ absl::StatusOr<Photographs> MakePhotographs(const DiagnosisInput& input, ThreadP
     if (one.object != other.object) return one.object < other.object;
     return set.has_session_time && one.session_time_s < other.session_time_s;
   });
+  TakeCopiesOut(&photographs);
   for (const int row : photographs.row) {
     photographs.object.push_back(set.photographs[row].object);
     photographs.measured_grey.push_back(set.Grey(row));

@@ -21,7 +21,8 @@ struct Photographs {
   std::vector<std::string> objects;                                // as in the set
   std::vector<std::shared_ptr<const geometry::Surface>> surfaces;  // one per object
   std::vector<int> row;                                            // of the set
-  std::vector<int> object;                                         // index into objects
+  std::vector<std::string> copies;  // files left out: the pixels of another of the same pose
+  std::vector<int> object;          // index into objects
   std::vector<int> pose;  // group of equal commanded poses of one object, numbered by first appearance
   int poses = 0;
   std::vector<std::vector<float>> measured_grey;  // [k][row * width + column]

@@ -1,5 +1,8 @@
 #include "server/diagnosis/report/diagnosis.h"
 
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
 #include <algorithm>
 
 namespace touchstone::diagnosis::report {
@@ -42,6 +45,13 @@ void AddImprovement(const engine::Improvement& improvement, Diagnosis* diagnosis
   data.candidates = improvement.candidates;
   data.unexplained = improvement.unexplained;
   if (improvement.changed) diagnosis->improved_model = improvement.improved;
+}
+
+void SetCopiesAside(const std::vector<std::string>& files, Diagnosis* diagnosis) {
+  if (files.empty()) return;
+  constexpr char kReason[] = "the same picture as another";
+  diagnosis->data[0].set_aside.rows.push_back({kReason, static_cast<int>(files.size()), {}});
+  diagnosis->warnings.push_back(absl::StrCat(kReason, ", counted once: ", absl::StrJoin(files, ", ")));
 }
 
 double ReducibleShare(const NoiseFloor& floor, double rmse) {

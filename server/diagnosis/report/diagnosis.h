@@ -215,6 +215,9 @@ void SetNothingMissing(const std::optional<engine::NothingMissing>& found, Diagn
 // Verdict, steps and all else that every kind of measurement is told of, in the unit of data[0].
 void AddImprovement(const engine::Improvement& improvement, Diagnosis* diagnosis);
 
+// Pictures that say nothing new: their files among data[0]'s rows that are set aside, and a warning.
+void SetCopiesAside(const std::vector<std::string>& files, Diagnosis* diagnosis);
+
 // The share of a squared error that is the model's, not noise: 0 to 1.
 double ReducibleShare(const NoiseFloor& floor, double rmse);
 

@@ -36,8 +36,6 @@ DataReport DataOf(const boards::BoardDiagnosis& found, const boards::BoardSet& s
   if (!set.without_board.empty())
     data.set_aside.rows.push_back(
         {"the whole board is not in the picture", static_cast<int>(set.without_board.size()), {}});
-  if (!found.copies.empty())
-    data.set_aside.rows.push_back({"the same picture as another", static_cast<int>(found.copies.size()), {}});
   data.lens = found.lens;
   if (found.initial) data.initial = *found.initial;
   if (found.final) data.final = *found.final;
@@ -67,6 +65,7 @@ Diagnosis FromBoards(const boards::BoardDiagnosis& found, const boards::BoardSet
   diagnosis.uncertainty = found.uncertainty;
   diagnosis.summary = found.summary;
   diagnosis.warnings = found.warnings;
+  SetCopiesAside(found.copies, &diagnosis);
   diagnosis.duration_s = found.duration_s;
   return diagnosis;
 }

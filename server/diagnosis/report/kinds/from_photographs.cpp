@@ -78,7 +78,7 @@ DataReport DataOf(const images::PhotographDiagnosis& found, const session::Image
   data.rows = static_cast<int>(set.size());
   data.objects = set.objects;
   data.poses = static_cast<int>(poses.size());
-  data.repeats = static_cast<int>(set.size() - poses.size());
+  data.repeats = data.count - data.poses;
   data.rounds = static_cast<int>(rounds.size());
   return data;
 }
