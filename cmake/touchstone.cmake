@@ -52,7 +52,7 @@ endif()
 
 # Half a hundred programs are linked with all that they test: mold takes a tenth of the time that GNU ld takes.
 find_program(MOLD mold)
-if(MOLD)
+if(MOLD AND NOT CMAKE_CROSSCOMPILING)  # GCC for another processor looks for one of that name
   add_link_options(-fuse-ld=mold)
 endif()
 

@@ -38,6 +38,36 @@ build() {
   cmake --build "$directory" -j "$(jobs_that_fit)" "${targets[@]}"
 }
 
+# wheel_options LIBRARIES: what CMake is told of programs for a wheel, one option a line; LIBRARIES is the folder of the libraries.
+# Without OpenCV: its cameras would bring FFmpeg, GStreamer and GDAL, 240 MB more. With a static libarchive and the libraries
+# that the dynamic one names, since its only call of glibc 2.36 is then answered by server/base/process/arc4random_buf.cpp, and the
+# glibc 2.35 of Ubuntu 22.04 is enough.
+wheel_options() {
+  printf '%s\n' -DTOUCHSTONE_CAMERA=OFF "-Dpkgcfg_lib_ARCHIVE_archive=$1/libarchive.a" \
+    "-DCMAKE_CXX_STANDARD_LIBRARIES=$(readelf -d "$1/libarchive.so" | sed -n 's/.*(NEEDED).*\[\(.*\)\].*/-l:\1/p' | paste -sd ' ')"
+}
+
+# build_arm64 TARGET ...: builds programs for a wheel of 64-bit ARM in build/arm64, with the libraries of a Debian 12 root in
+# build/arm64_root that is unpacked and not set up.
+build_arm64() {
+  local sysroot=$root/build/arm64_root libraries link options
+  # What the group build names, less what runs on this machine.
+  libraries=$(awk '/^\[/ { inside = $1 == "[build]" } inside && /^[a-z0-9]/ { print $1 }' deploy/packages.txt |
+    grep -vE '^(g\+\+|cmake|ninja-build|mold|ccache|pkg-config|git|npm|libopencv-.*)$' | paste -sd ,)
+  if [[ ! -f $sysroot.made || $(< "$sysroot.made") != "$libraries" ]]; then
+    rm -rf "$sysroot" build/arm64
+    mmdebstrap --quiet --architectures=arm64 --variant=extract --include="$libraries" bookworm "$sysroot" || return
+    # As seen from within the root: links lead to the root's files, and to what its alternatives would be.
+    find "$sysroot" -type l -lname '/*' | while read -r link; do
+      ln -sfnr "$sysroot$(readlink "$link")" "$link"
+    done
+    ln -s hdf5-serial.pc "$sysroot/usr/lib/aarch64-linux-gnu/pkgconfig/hdf5.pc"
+    printf '%s' "$libraries" > "$sysroot.made"
+  fi
+  mapfile -t options < <(wheel_options "$sysroot/usr/lib/aarch64-linux-gnu")
+  build release build/arm64 --toolchain "$root/cmake/aarch64.cmake" -DTOUCHSTONE_SYSROOT="$sysroot" "${options[@]}" -- "$@"
+}
+
 # The Python packages, built as the wheels that users install, in build/venv over Debian's NumPy and gRPC. Nothing
 # is done when the files of the packages are those that were installed last.
 install_python_package() {
