@@ -23,10 +23,10 @@ json NumberOrNull(double value) {
   return std::isfinite(value) ? json(value) : json();
 }
 
-json LadderJson(const v1::Report& report) {
+json LadderJson(const v1::Report& report, const v1::DataReport& data) {
   static const char* const kKinds[] = {"given", "refit", "step", "suggestion", "floor"};
   json rungs = json::array();
-  for (const Rung& rung : Ladder(report))
+  for (const Rung& rung : Ladder(report, data))
     rungs.push_back({{"kind", kKinds[rung.kind]},
                      {"name", rung.name},
                      {"rmse", NumberOrNull(rung.rmse)},
@@ -49,14 +49,18 @@ json UncertaintyJson(const v1::DataReport& data) {
   return objects;
 }
 
-json DataJson(const v1::DataReport& data) {
+json DataJson(const v1::Report& report, const v1::DataReport& data) {
   const Floor floor = NoiseFloorOf(data);
-  return {{"kind_name", KindName(data.kind())},
+  json words = {{"kind_name", KindName(data.kind())},
           {"floor", floor.sigma},
           {"floor_is_bound", floor.bound},
           {"finger_bias", FingerBiasWords(data)},
           {"nearest_effect", NearestEffectWords(data.unexplained())},
+          {"times_the_floor", TimesTheFloor(report, data)},
           {"uncertainty", UncertaintyJson(data)}};
+  // Of one kind alone it is the report's.
+  if (IsJoint(report)) words["ladder"] = LadderJson(report, data);
+  return words;
 }
 
 // Sentences, names and commands that need the rules of words.h; the page writes numbers itself.
@@ -65,17 +69,17 @@ json PageWords(const v1::Report& report) {
   json words = {{"headline", Headline(report)},
                 {"summary", IsJoint(report) ? report.summary() : SummaryToShow(report)},
                 {"data", DataInWords(report, "\u00d7")},
-                {"floor", NoiseFloorSentence(main)},
-                {"times_the_floor", TimesTheFloor(report)},
+                {"floor", NoiseFloorSentences(report)},
+                {"times_the_floor", TimesTheFloor(report, main)},
                 {"nothing_missing", NothingMissingWords(report)},
                 {"finger_scatter",
                  report.verdict() == v1::Report::ADEQUATE ? std::string() : FingerScatterWords(report)},
-                {"ladder", LadderJson(report)},
+                {"ladder", LadderJson(report, main)},
                 {"command", ShellLines(report.provenance().command(), kCommandColumns)}};
-  for (const char* list : {"commands", "problems", "ambiguities", "next", "steps", "of_data"})
+  for (const char* list : {"commands", "problems", "ambiguities", "next", "steps", "to_tell", "of_data"})
     words[list] = json::array();
   for (int i = 0; i < report.data_size(); ++i) {
-    words["of_data"].push_back(DataJson(report.data(i)));
+    words["of_data"].push_back(DataJson(report, report.data(i)));
     if (&report.data(i) == &main) words["main"] = i;
   }
   for (const NextCommand& next : NextCommands(report))
@@ -88,7 +92,10 @@ json PageWords(const v1::Report& report) {
                                                                               ambiguity->effects().end()))},
                                     {"to_decide", ToDecide(ambiguity->discriminating_measurement())}});
   for (const v1::NextMeasurement& next : report.next()) words["next"].push_back(CountToVerdict(next));
-  for (const v1::Step& step : report.steps()) words["steps"].push_back(StepName(step));
+  for (const v1::Step& step : report.steps()) {
+    words["steps"].push_back(StepName(step));
+    words["to_tell"].push_back(WhatToTell(report, step));
+  }
   return words;
 }
 

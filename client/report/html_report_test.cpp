@@ -67,6 +67,21 @@ TEST(PageData, NamesTheRungsOfTheLadder) {
   EXPECT_TRUE(rungs.back()["heldout_rmse"].is_null());
 }
 
+TEST(PageData, OfAJointReportHasALadderForEachKind) {
+  const json words = DataOfPage(JointReport())["words"];
+  for (int kind = 0; kind < 2; ++kind) {
+    const json& rungs = words["of_data"][kind]["ladder"];
+    ASSERT_EQ(rungs.size(), 4u);
+    EXPECT_EQ(rungs[0]["rmse"], kind == 0 ? 41000 : 6.03);
+  }
+  EXPECT_FALSE(DataOfPage(MissingEffectsReport())["words"]["of_data"][0].contains("ladder"));
+}
+
+TEST(PageData, NamesWhatEveryStepIsToldFrom) {
+  const json words = DataOfPage(MissingEffectsReport())["words"];
+  EXPECT_EQ(words["to_tell"][0], "To tell tip_radius from surface_offset");
+}
+
 TEST(PageData, GivesEveryProblemItsTitleAndItsCommandOverLines) {
   const json words = DataOfPage(CheckDataReport())["words"];
   ASSERT_EQ(words["problems"].size(), 2u);

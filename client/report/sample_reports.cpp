@@ -326,6 +326,23 @@ v1::Report WithoutPosesReport() {
   return report;
 }
 
+v1::Report JointReport() {
+  v1::Report report = MissingEffectsReport();
+  v1::DataReport& pictures = *report.add_data();
+  pictures.set_kind(v1::DataReport::PHOTOGRAPHS);
+  pictures.set_unit("grey");
+  pictures.set_session("measurements/lab-2026-03");
+  pictures.set_count(12);
+  pictures.set_noise_floor(1.43);
+  pictures.mutable_noise()->set_from_repeats(true);
+  pictures.mutable_set()->set_repeats(2);
+  pictures.set_reducible_share(0.94);
+  SetQuality(6.03, 6.04, 0, pictures.mutable_initial());
+  for (const double rmse : {2.2, 1.43}) SetQuality(rmse, rmse, 0.9, pictures.add_after_step());
+  SetQuality(1.43, 1.43, 0.9, pictures.mutable_final());
+  return report;
+}
+
 std::vector<NamedReport> AllSampleReports() {
   return {{"missing_effects", MissingEffectsReport()},
           {"wrong_values", WrongValuesReport()},
@@ -335,6 +352,7 @@ std::vector<NamedReport> AllSampleReports() {
           {"too_little_data", TooLittleDataReport()},
           {"compare", CompareReport()},
           {"without_poses", WithoutPosesReport()},
+          {"joint", JointReport()},
           {"empty", v1::Report()}};
 }
 

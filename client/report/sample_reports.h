@@ -17,6 +17,7 @@ v1::Report CheckDataReport();       // two mistakes that cannot be told apart
 v1::Report TooLittleDataReport();   // six touches
 v1::Report CompareReport();         // no verdict
 v1::Report WithoutPosesReport();    // distributions only
+v1::Report JointReport();           // that of missing effects, with photographs
 
 struct NamedReport {
   std::string name;

@@ -21,7 +21,7 @@ constexpr double kSessionP = 0.01;
 void AddOpening(const v1::Report& report, TextLayout* out) {
   std::string text = DataInWords(report, "x");
   absl::StrAppend(&text, ".");
-  text += NoiseFloorSentence(MainData(report));
+  text += NoiseFloorSentences(report);
   out->Lead(text);
   for (const std::string& warning : report.warnings())
     out->Lead(absl::StrCat("Note: ", warning), TextLayout::kBad);
@@ -38,7 +38,7 @@ void AddHowWrong(const v1::Report& report, TextLayout* out) {
   const v1::DataReport& data = MainData(report);
   const ErrorScale scale(data);
   if (!(data.initial().rmse() > 0)) return;
-  const std::string times = TimesTheFloor(report);
+  const std::string times = TimesTheFloor(report, data);
   out->Label("How wrong");
   out->Paragraph(
       absl::StrCat("RMSE ", scale.Text(data.initial().rmse()), times.empty() ? "" : ", ", times, "."));
@@ -119,7 +119,7 @@ void AddSession(const v1::Report& report, TextLayout* out) {
 }
 
 void AddLadder(const v1::Report& report, TextLayout* out) {
-  const std::vector<Rung> rungs = Ladder(report);
+  const std::vector<Rung> rungs = Ladder(report, MainData(report));
   if (rungs.empty()) return;
   out->Label("Ladder");
   const ErrorScale scale(MainData(report));

@@ -35,6 +35,15 @@ std::string InSession(const v1::Report& report) {
   return "";
 }
 
+// "960 touches"; of a joint report "93 touches and 12 pictures".
+std::string Readings(const v1::Report& report) {
+  std::vector<std::string> counts;
+  for (const v1::DataReport& data : report.data())
+    if (IsJoint(report) || &data == &MainData(report))
+      counts.push_back(absl::StrCat(Count(data.count()), " ", ErrorScale(data).readings()));
+  return Join(counts, "and");
+}
+
 // A step that says nothing of single touches (a surface error) leaves the error where it was.
 bool FallsAtAll(const ErrorScale& scale, double from, double to) {
   return scale.Text(from) != scale.Text(to) && to < from;
@@ -226,8 +235,7 @@ std::string Headline(const v1::Report& report) {
       if (report.has_sessions())
         return absl::StrCat("Nothing is missing and nothing changed: ", model,
                             " is as good as the touches of ", report.data_size(), " sessions can tell.");
-      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Count(MainData(report).count()),
-                          " ", ErrorScale(MainData(report)).readings(), " can tell.");
+      return absl::StrCat("Nothing is missing: ", model, " is as good as ", Readings(report), " can tell.");
     case v1::Report::WRONG_VALUES:
       return WrongValues(report);
     case v1::Report::MISSING_EFFECTS:

@@ -24,8 +24,7 @@ std::string CovariateName(const std::string& name) {
   return stem.size() < name.size() ? absl::StrReplaceAll(stem, {{"_", " "}}) : name;
 }
 
-std::string TimesTheFloor(const v1::Report& report) {
-  const v1::DataReport& data = MainData(report);
+std::string TimesTheFloor(const v1::Report& report, const v1::DataReport& data) {
   const Floor floor = NoiseFloorOf(data);
   const ErrorScale scale(data);
   const double ratio = floor.sigma > 0 ? data.initial().rmse() / floor.sigma : 0;

@@ -213,12 +213,12 @@ std::string FloorWithLength(const v1::DataReport& data) {
 
 }  // namespace
 
-std::string NoiseFloorSentence(const v1::DataReport& data) {
+std::string NoiseFloorSentence(const v1::DataReport& data, const std::string& of) {
   const Floor floor = NoiseFloorOf(data);
   if (!(floor.sigma > 0)) return "";
   if (IsNoiseOfPlan(data)) return absl::StrCat(" Noise of one finger's time ", FloorWithLength(data), ".");
   const uint32_t repeats = data.set().repeats();
-  return absl::StrCat(" Noise floor ", floor.bound ? "at most " : "", FloorWithLength(data),
+  return absl::StrCat(" Noise floor", of, " ", floor.bound ? "at most " : "", FloorWithLength(data),
                       data.noise().is_rounding()
                           ? ", what files and meshes are rounded to: the data scatter by less."
                       : floor.bound ? ", an upper bound without repeats."
@@ -226,9 +226,16 @@ std::string NoiseFloorSentence(const v1::DataReport& data) {
                                     : ".");
 }
 
-std::vector<Rung> Ladder(const v1::Report& report) {
+std::string NoiseFloorSentences(const v1::Report& report) {
+  if (!IsJoint(report)) return NoiseFloorSentence(MainData(report));
+  std::string sentences;
+  for (const v1::DataReport& data : report.data())
+    sentences += NoiseFloorSentence(data, absl::StrCat(" of the ", ErrorScale(data).readings()));
+  return sentences;
+}
+
+std::vector<Rung> Ladder(const v1::Report& report, const v1::DataReport& data) {
   std::vector<Rung> rungs;
-  const v1::DataReport& data = MainData(report);
   const ErrorScale scale(data);
   if (!(data.initial().rmse() > 0)) return rungs;
   const auto add = [&](Rung::Kind kind, std::string name, const v1::Quality& quality) {
@@ -271,6 +278,20 @@ std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report) {
     if (effects.size() > 1 && named.insert(effects).second) others.push_back(&ambiguity);
   }
   return others;
+}
+
+std::string WhatToTell(const v1::Report& report, const v1::Step& step) {
+  std::vector<std::string> others(step.equivalent().begin(), step.equivalent().end());
+  for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
+    const auto& effects = ambiguity.effects();
+    if (!step.equivalent().empty() || std::find(effects.begin(), effects.end(), step.effect()) == effects.end())
+      continue;
+    for (const std::string& effect : effects)
+      if (effect != step.effect() && std::find(others.begin(), others.end(), effect) == others.end())
+        others.push_back(effect);
+  }
+  return absl::StrCat("To tell ", step.effect(), " from ",
+                      others.empty() ? "a cause without a name" : Join(others, "or"));
 }
 
 std::string ToDecide(const std::string& discriminating_measurement) {

@@ -60,8 +60,11 @@ struct Floor {
   bool bound = false;
 };
 Floor NoiseFloorOf(const v1::DataReport& data);
-// " Noise floor 5.00 ms (0.10 mm at 20 mm/s), from 720 repeats."; empty if it is unknown.
-std::string NoiseFloorSentence(const v1::DataReport& data);
+// " Noise floor 5.00 ms (0.10 mm at 20 mm/s), from 720 repeats."; empty if it is unknown. `of`: " of the touches", where there are
+// several kinds.
+std::string NoiseFloorSentence(const v1::DataReport& data, const std::string& of = "");
+// That of MainData; of a joint report a sentence for each kind.
+std::string NoiseFloorSentences(const v1::Report& report);
 
 // One rung of the ladder.
 struct Rung {
@@ -72,11 +75,14 @@ struct Rung {
   double heldout_rmse;   // NaN: none
   double lack_of_fit_p;  // NaN: none
 };
-// The given model, what was changed, and the noise floor, of MainData; empty for a set without poses.
-std::vector<Rung> Ladder(const v1::Report& report);
+// The given model, what was changed, and the noise floor, of one entry of the report; empty for a set without poses.
+std::vector<Rung> Ladder(const v1::Report& report, const v1::DataReport& data);
 
 // Pairs that no step names as its equivalents.
 std::vector<const v1::Ambiguity*> OtherAmbiguities(const v1::Report& report);
+// What the discriminating measurement of a step tells from what: "To tell exposure from the albedo of all objects". The others
+// are its equivalents, or whatever the report's ambiguities name beside it; "a cause without a name" where neither has any.
+std::string WhatToTell(const v1::Report& report, const v1::Step& step);
 // "To decide: a second speed", or the text itself if it is a sentence.
 std::string ToDecide(const std::string& discriminating_measurement);
 // The report's own summary where its parts do not say the same at more length: without a ladder.
@@ -89,9 +95,9 @@ std::string ProblemTitle(const v1::DataProblem& problem);
 
 // "incidence" of incidence_deg, "session time" of session_time_s.
 std::string CovariateName(const std::string& name);
-// "6.9 times the floor: 97.9 % of the error is the model's, not noise", as the verdict allows to say; empty
+// "6.9 times the floor: 97.9 % of the error is the model's, not noise", as the verdict allows to say of this entry; empty
 // without a floor.
-std::string TimesTheFloor(const v1::Report& report);
+std::string TimesTheFloor(const v1::Report& report, const v1::DataReport& data);
 // What one noise for all fingers of touches does not explain; empty if nothing.
 std::string FingerScatterWords(const v1::Report& report);
 // "l +9.10 ms, m -850 us": the mean residual of each finger; empty if the entry has none.

@@ -1,6 +1,13 @@
 #include "client/report/words/words.h"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +16,7 @@
 #include "client/report/report.h"
 #include "client/report/sample_reports.h"
 #include "client/report/words/error_scale.h"
+#include "server/base/test_paths.h"
 
 namespace touchstone::client {
 namespace {
@@ -24,58 +32,54 @@ v1::ParameterValue Value(double value, double error, const char* unit) {
   return parameter;
 }
 
-TEST(Time, IsInMicrosecondsBelowOneMillisecond) {
-  EXPECT_EQ(Time(850), "850 us");
-  EXPECT_EQ(Time(999.6), "1.00 ms");
-  EXPECT_EQ(Time(41000), "41.0 ms");
-  EXPECT_EQ(Time(2.5e6), "2.50 s");
-  EXPECT_EQ(Time(std::nan("")), "n/a");
-  EXPECT_EQ(SignedTime(9100), "+9.10 ms");
-  EXPECT_EQ(SignedTime(-850), "-850 us");
+std::vector<Rung> LadderOf(const v1::Report& report) {
+  return Ladder(report, MainData(report));
+}
+
+// What a rule makes of its arguments.
+std::string Written(const std::string& rule, const std::vector<double>& arguments) {
+  const std::vector<std::string> parts = absl::StrSplit(rule, ' ');
+  const double first = arguments.at(0);
+  v1::DataReport pictures, boards;
+  pictures.set_kind(v1::DataReport::PHOTOGRAPHS);
+  boards.set_kind(v1::DataReport::BOARDS);
+  if (rule == "time") return Time(first);
+  if (rule == "signed_time") return SignedTime(first);
+  if (rule == "grey") return ErrorScale(pictures).Text(first);
+  if (rule == "px") return ErrorScale(boards).Text(first);
+  if (rule == "probability") return Probability(first);
+  if (rule == "effect_probability") return EffectProbability(first);
+  if (rule == "share") return Share(first);
+  if (rule == "count") return Count(static_cast<uint64_t>(first));
+  if (parts[0] == "value") return ValueWithError(Value(first, arguments.at(1), parts.at(1).c_str()));
+  if (parts[0] != "interval") return absl::StrCat("no rule ", rule);
+  v1::ParameterValue interval = Value(first, 0, parts.at(1).c_str());
+  interval.set_lower(first);
+  interval.set_upper(arguments.at(1));
+  return Interval(interval);
+}
+
+// The page's test reads the same file.
+TEST(Words, WriteEveryCaseOfTheTableThatThePageReadsToo) {
+  std::ifstream file(SourceDir() + "/client/report/words/word_cases.txt");
+  std::set<std::string> rules;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    const std::vector<std::string> parts = absl::StrSplit(line, '|');
+    ASSERT_EQ(parts.size(), 3u) << line;
+    const std::string rule(absl::StripAsciiWhitespace(parts[0]));
+    std::vector<double> arguments;
+    for (const absl::string_view text : absl::StrSplit(absl::StripAsciiWhitespace(parts[1]), ' '))
+      arguments.push_back(std::strtod(std::string(text).c_str(), nullptr));
+    EXPECT_EQ(Written(rule, arguments), absl::StripAsciiWhitespace(parts[2])) << line;
+    rules.insert(rule);
+  }
+  EXPECT_EQ(rules.size(), 15u) << "every rule has cases";
 }
 
 TEST(TimeChange, SharesOneUnit) {
   EXPECT_EQ(TimeChange(41000, 5000), "41.0 -> 5.0 ms");
   EXPECT_EQ(TimeChange(1200, 815), "1.20 -> 0.82 ms");
-}
-
-TEST(ValueWithError, HasAsManyDigitsAsTheErrorAllows) {
-  EXPECT_EQ(ValueWithError(Value(2.9812, 0.0211, "mm")), "2.98 +- 0.02 mm");
-  EXPECT_EQ(ValueWithError(Value(2.9812, 0.0123, "mm")), "2.981 +- 0.012 mm");
-  EXPECT_EQ(ValueWithError(Value(0, 0.0123, "mm")), "0.000 +- 0.012 mm");
-  // Seven digits of a value, however small its error.
-  EXPECT_EQ(ValueWithError(Value(20, 0.000001, "mm")), "20.00000 +- 1e-6 mm");
-  EXPECT_EQ(ValueWithError(Value(20000, 0.001, "us")), "20.00000 +- 1e-6 ms");
-  EXPECT_EQ(ValueWithError(Value(8200, 190, "us")), "8.20 +- 0.19 ms");
-  EXPECT_EQ(ValueWithError(Value(-0.001, 0.5, "deg")), "0.0 +- 0.5 deg");
-  EXPECT_EQ(ValueWithError(Value(20, 0, "mm/s")), "20 mm/s");
-  EXPECT_EQ(ValueWithError(Value(20, std::nan(""), "mm/s")), "20.0 mm/s");
-}
-
-TEST(Probability, HasOneDigitOfSmallValues) {
-  EXPECT_EQ(Probability(0), "< 1e-15");
-  EXPECT_EQ(Probability(3.2e-9), "3e-9");
-  EXPECT_EQ(Probability(0.0123), "0.012");
-  EXPECT_EQ(Probability(0.44), "0.44");
-}
-
-TEST(EffectProbability, NeverClaimsCertainty) {
-  EXPECT_EQ(EffectProbability(1), "> 0.99");
-  EXPECT_EQ(EffectProbability(0.97), "0.97");
-  EXPECT_EQ(EffectProbability(0), "< 0.01");
-}
-
-TEST(Share, ShowsTenthsNearTheEnds) {
-  EXPECT_EQ(Share(0.985), "98.5 %");
-  EXPECT_EQ(Share(0.71), "71 %");
-  EXPECT_EQ(Share(0.04), "4.0 %");
-  EXPECT_EQ(Share(1), "100 %");
-}
-
-TEST(Count, GroupsLongNumbers) {
-  EXPECT_EQ(Count(960), "960");
-  EXPECT_EQ(Count(8000), "8000");
-  EXPECT_EQ(Count(1234567), "1 234 567");
 }
 
 TEST(Headline, SaysEveryVerdictInOneSentence) {
@@ -180,15 +184,15 @@ TEST(ToDecide, TakesSentencesAsTheyAre) {
 }
 
 TEST(Ladder, RunsFromTheGivenModelToTheFloor) {
-  std::vector<Rung> rungs = Ladder(MissingEffectsReport());
+  std::vector<Rung> rungs = LadderOf(MissingEffectsReport());
   ASSERT_EQ(rungs.size(), 4u);
   EXPECT_EQ(rungs[0].name, "nominal");
   EXPECT_EQ(rungs[1].name, "+ tip_radius or surface_offset");
   EXPECT_EQ(rungs[2].rmse, 5010);
   EXPECT_EQ(rungs[3].kind, Rung::kFloor);
-  EXPECT_EQ(Ladder(WrongValuesReport())[1].kind, Rung::kRefit);
-  EXPECT_EQ(Ladder(UnexplainedReport())[1].kind, Rung::kSuggestion);
-  EXPECT_TRUE(Ladder(v1::Report()).empty());
+  EXPECT_EQ(LadderOf(WrongValuesReport())[1].kind, Rung::kRefit);
+  EXPECT_EQ(LadderOf(UnexplainedReport())[1].kind, Rung::kSuggestion);
+  EXPECT_TRUE(LadderOf(v1::Report()).empty());
 }
 
 TEST(JsonReport, HasTheKeysThatOthersRelyOn) {
@@ -198,7 +202,7 @@ TEST(JsonReport, HasTheKeysThatOthersRelyOn) {
     const nlohmann::json json = nlohmann::json::parse(*text);
     for (const char* key : {"verdict", "data_problems", "superfluous", "refitted", "steps", "data", "next"})
       EXPECT_TRUE(json.contains(key)) << sample.name << " " << key;
-    EXPECT_EQ(json["data"].size(), sample.report.data().empty() ? 0u : 1u) << sample.name;
+    EXPECT_EQ(json["data"].size(), static_cast<size_t>(sample.report.data_size())) << sample.name;
     for (const nlohmann::json& data : json["data"]) {
       for (const char* key : {"kind", "unit", "session", "emulated", "count", "noise_floor", "initial",
                               "after_step", "final", "where", "unexplained"})
@@ -250,9 +254,10 @@ TEST(Headline, OfAnAdequateModelNamesAFingerThatScattersOtherwise) {
 
 TEST(TimesTheFloor, BlamesTheFileWhereTheFileIsWrong) {
   v1::Report report = CheckDataReport();
-  EXPECT_THAT(TimesTheFloor(report), HasSubstr("the error is the file's but for 14.4 ms"));
-  EXPECT_THAT(TimesTheFloor(report), Not(HasSubstr("the model's, not noise")));
-  EXPECT_THAT(TimesTheFloor(MissingEffectsReport()), HasSubstr("is the model's, not noise"));
+  EXPECT_THAT(TimesTheFloor(report, report.data(0)), HasSubstr("the error is the file's but for 14.4 ms"));
+  EXPECT_THAT(TimesTheFloor(report, report.data(0)), Not(HasSubstr("the model's, not noise")));
+  const v1::Report missing = MissingEffectsReport();
+  EXPECT_THAT(TimesTheFloor(missing, missing.data(0)), HasSubstr("is the model's, not noise"));
 }
 
 TEST(CovariateName, IsInWords) {
@@ -285,6 +290,26 @@ TEST(ErrorScale, WritesErrorsInTheUnitOfTheKind) {
   EXPECT_EQ(ErrorScale(boards).Change(1.234, 0.2), "1.23 -> 0.200 px");
   EXPECT_STREQ(ErrorScale(touches).readings(), "touches");
   EXPECT_STREQ(ErrorScale(boards).Counted(1), "picture");
+}
+
+TEST(WhatToTell, NamesWhatTheDiscriminatingMeasurementPartsAStepFrom) {
+  v1::Report report = MissingEffectsReport();
+  EXPECT_EQ(WhatToTell(report, report.steps(0)), "To tell tip_radius from surface_offset");
+  EXPECT_EQ(WhatToTell(report, report.steps(1)), "To tell channel_latency from finger_length");
+  report.clear_ambiguities();
+  EXPECT_EQ(WhatToTell(report, report.steps(1)), "To tell channel_latency from a cause without a name");
+}
+
+TEST(JointReport, TellsOfBothKinds) {
+  v1::Report report = JointReport();
+  EXPECT_THAT(NoiseFloorSentences(report), HasSubstr(" Noise floor of the touches 5.00 ms (0.10 mm at 20 mm/s)"));
+  EXPECT_THAT(NoiseFloorSentences(report), HasSubstr(" Noise floor of the pictures 1.43 grey (levels of 255)"));
+  EXPECT_THAT(TimesTheFloor(report, report.data(0)), HasSubstr("8.2 times the floor"));
+  EXPECT_THAT(TimesTheFloor(report, report.data(1)), HasSubstr("4.2 times the floor"));
+  EXPECT_EQ(Ladder(report, report.data(0)).size(), Ladder(report, report.data(1)).size());
+  report.clear_steps();
+  report.set_verdict(v1::Report::ADEQUATE);
+  EXPECT_THAT(Headline(report), HasSubstr("as good as 960 touches and 12 pictures can tell"));
 }
 
 }  // namespace

@@ -1,35 +1,24 @@
-// Numbers as people read them. The rules are those of client/report/words/words.cpp.
+// Numbers as people read them: the digits of numbers.ts, and the rules of client/report/words/words.h (its cases, in
+// client/report/words/word_cases.txt, are read by the test of this file too), set in type.
 import type { DataReport, Kind, Value } from "./data/report";
+import { decimalsFor, fixedNumber, roundedNumber, valueWithError } from "./numbers";
 
 const minus = "\u2212";
 const thin = "\u2009";
 
-function signed(text: string): string { return text.replace(/^-/, minus); }
-
-// `digits` significant digits, no exponent between 1e-4 and 1e7; "n/a" where it is not known.
-export function number(value: number | null | undefined, digits = 3): string {
-  if (value === null || value === undefined || Number.isNaN(value)) return "n/a";
-  if (!Number.isFinite(value)) return value > 0 ? "\u221e" : `${minus}\u221e`;
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e7 || size < 1e-4) {
-    const [mantissa, exponent] = value.toExponential(Math.min(digits - 1, 1)).split("e");
-    const power = superscript(Number(exponent));
-    return signed(mantissa === "1.0" || mantissa === "1" ? `10${power}` : `${mantissa}\u00d710${power}`);
-  }
-  const places = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
-  return signed(value.toFixed(places));
-}
-
-export function fixed(value: number, places: number): string {
-  if (Number.isNaN(value)) return "n/a";
-  const text = value.toFixed(places);
-  return signed(Number(text) === 0 ? text.replace("-", "") : text);
-}
-
 function superscript(exponent: number): string {
   return String(exponent).replace("-", "\u207b").replace(/\d/g, (digit) => "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[Number(digit)]);
 }
+
+// `digits` significant digits, no exponent between 1e-4 and 1e7; "n/a" where it is not known.
+export function number(value: number | null | undefined, digits = 3): string {
+  return typeset(roundedNumber(value ?? Number.NaN, digits)).replace("infinite", "\u221e");
+}
+
+export function fixed(value: number, places: number): string { return typeset(fixedNumber(value, places)); }
+
+// A value with its standard error, of one unit: "2.98 \u00b1 0.02".
+export function plusMinus(value: number, stdError: number): string { return typeset(valueWithError(value, stdError)); }
 
 // Whole numbers of at least five digits in groups.
 export function count(value: number): string {
@@ -38,16 +27,20 @@ export function count(value: number): string {
 
 export function probability(p: number | null | undefined): string {
   if (p === null || p === undefined || Number.isNaN(p)) return "n/a";
-  if (p < 1e-15) return `<${thin}10\u207b\u00b9\u2075`;
-  return p < 0.001 ? number(p, 1) : p.toFixed(p < 0.1 ? 3 : 2);
+  if (p < 1e-15) return typeset("< 1e-15");
+  if (p < 0.001) return number(p, 1);
+  return p > 0.995 ? "1.00" : fixed(p, p < 0.1 ? 3 : 2);
 }
 
 export function effectProbability(p: number): string {
-  return p < 0.01 ? `<${thin}0.01` : p > 0.99 ? `>${thin}0.99` : p.toFixed(2);
+  if (Number.isNaN(p)) return "";
+  return typeset(p < 0.005 ? "< 0.01" : p > 0.995 ? "> 0.99" : fixed(p, 2));
 }
 
 export function share(value: number): string {
-  return Number.isNaN(value) ? "n/a" : `${fixed(100 * value, Math.abs(value) < 0.0995 || value > 0.995 ? 1 : 0)}${thin}%`;
+  if (Number.isNaN(value)) return "n/a";
+  const percent = 100 * value;
+  return typeset(`${fixedNumber(percent, Math.abs(percent) < 9.95 || (percent > 97 && percent < 99.95) ? 1 : 0)} %`);
 }
 
 export interface Unit { symbol: string; factor: number }
@@ -66,6 +59,7 @@ export function error(kind: Kind, value: number | null | undefined): string {
   const unit = unitFor(kind, Math.abs(value));
   const symbol = kind === "PHOTOGRAPHS" ? "grey" : unit.symbol;
   const size = Math.abs(value);
+  // Never finer than a hundredth of a grey level.
   const text = kind === "PHOTOGRAPHS" ? fixed(value, size < 9.995 ? 2 : size < 99.95 ? 1 : 0) : number(value * unit.factor);
   return `${text}\u00a0${symbol}`;
 }
@@ -83,31 +77,23 @@ export function valueName(value: Value): string {
   return `${value.name}${entry}${value.object ? `, ${value.object}` : ""}`;
 }
 
-export const unitSymbol = (unit: string) => (unit === "us" ? "\u00b5s" : unit === "deg" ? "\u00b0" : unit);
+export const unitSymbol = (unit: string) => (unit === "deg" ? "\u00b0" : unit.replace(/^us\b/, "\u00b5s").replace("^2", "\u00b2"));
 
-// Times in the unit for people; others as they are.
-function scaled(value: Value): { factor: number; symbol: string } {
-  if (value.unit !== "us") return { factor: 1, symbol: unitSymbol(value.unit) };
-  const unit = unitFor("TOUCHES", Math.max(Math.abs(value.value), value.std_error || 0));
-  return { factor: unit.factor, symbol: unit.symbol };
+// Times in the unit for people that fits this size; others as they are.
+function scaled(size: number, unit: string): Unit {
+  return unit === "us" ? unitFor("TOUCHES", size) : { factor: 1, symbol: unitSymbol(unit) };
 }
 
-const spaced = (symbol: string) => (symbol ? (symbol === "\u00b0" ? symbol : `\u00a0${symbol}`) : "");
+export const spaced = (symbol: string) => (symbol ? (symbol === "\u00b0" ? symbol : `\u00a0${symbol}`) : "");
 
-// "2.98 ± 0.02 mm": as many digits as the error allows.
+// "2.98 \u00b1 0.02 mm": as many digits as the error allows.
 export function withError(value: Value): string {
-  const { factor, symbol } = scaled(value);
-  const x = value.value * factor;
-  const sigma = value.std_error * factor;
-  if (!(sigma > 0) || !Number.isFinite(sigma)) return `${number(x)}${spaced(symbol)}`;
-  const places = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
-  return `${fixed(x, places)}\u00a0\u00b1\u00a0${sigma.toFixed(places)}${spaced(symbol)}`;
+  const { factor, symbol } = scaled(Math.max(Math.abs(value.value), value.std_error || 0), value.unit);
+  return `${plusMinus(value.value * factor, value.std_error * factor)}${spaced(symbol)}`;
 }
 
 export function before(value: Value): string {
-  if (value.before === undefined) return "";
-  const { factor, symbol } = scaled(value);
-  return `${number(value.before * factor)}${spaced(symbol)}`;
+  return value.before === undefined ? "" : withError({ ...value, value: value.before, std_error: 0 });
 }
 
 export function hasInterval(value: Value): boolean {
@@ -116,8 +102,15 @@ export function hasInterval(value: Value): boolean {
 
 export function interval(value: Value): string {
   if (!hasInterval(value)) return "";
-  const { factor, symbol } = scaled(value);
-  return `${number(value.lower * factor)} to ${number(value.upper * factor)}${spaced(symbol)}`;
+  const { factor, symbol } = scaled(Math.max(Math.abs(value.lower), Math.abs(value.upper)), value.unit);
+  const decimals = decimalsFor((value.upper - value.lower) * factor, 2);
+  return `${fixed(value.lower * factor, decimals)} to ${fixed(value.upper * factor, decimals)}${spaced(symbol)}`;
+}
+
+// A size of a value in its unit: "0.16\u00b0", "1.2 ms".
+export function sized(value: number, unit: string, digits = 2): string {
+  const { factor, symbol } = scaled(Math.abs(value), unit);
+  return `${number(value * factor, digits)}${spaced(symbol)}`;
 }
 
 // "incidence (°)" of incidence_deg.
@@ -139,13 +132,14 @@ export function join(words: string[], last: string): string {
 // ASCII of the sentences, set in type.
 export function typeset(text: string): string {
   return text
-    .replace(/(^|[ ([])-(?=\d)/g, `$1${minus}`)
+    .replace(/(^|[ ([])-(?=\d|infinite)/g, `$1${minus}`)
     .replace(/ ?\+- /g, "\u00a0\u00b1\u00a0")
     .replace(/<->/g, "\u2194")
     .replace(/->/g, "\u2192")
+    .replace(/([<>=]) (?=\d)/g, `$1\u00a0`)
     .replace(/(\d) us\b/g, "$1\u00a0\u00b5s")
     .replace(/(\d) (ms|s|mm|mm\/s|%|px|grey)(?![\w/])/g, "$1\u00a0$2")
     .replace(/(\d) deg\b/g, "$1\u00b0")
-    .replace(/\b1e-?(\d+)\b/g, (all, power: string) => `10${superscript(all.includes("-") ? -Number(power) : Number(power))}`)
+    .replace(/(?<![\w.])1e(-?\d+)\b/g, (_, power: string) => `10${superscript(Number(power))}`)
     .replace(/(\d)e(-?\d+)\b/g, (_, digit: string, power: string) => `${digit}\u00d710${superscript(Number(power))}`);
 }

@@ -19,6 +19,9 @@ export const picture = signal<string | null>(null);
 export const covariate = signal<string>(""); // "": the one that the residual depends on most
 export const step = signal<number | null>(null); // of the ladder
 
+// Touches and pictures that were diagnosed together: every kind has its errors, in its unit.
+export const joint = computed(() => (page.value?.words.of_data ?? []).some((one) => one.ladder));
+
 export const hasImproved = computed(() => !!page.value?.report.improved_model_yaml);
 
 // Entries of several sessions share the page; a click on a session shows its touches.

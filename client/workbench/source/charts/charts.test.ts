@@ -6,6 +6,8 @@ test("ticks are round and within the range", () => {
   expect(ticks([-1.3, 4.2], 3)).toEqual([0, 2, 4]);
   expect(ticks([0, 100], 5)).toEqual([0, 20, 40, 60, 80, 100]);
   expect(ticks([3, 3], 5)).toEqual([]);
+  // One tick is no scale.
+  expect(ticks([-80, 95], 3.1)).toEqual([-50, 0, 50]);
 });
 
 test("a range holds all that is known and is never empty", () => {

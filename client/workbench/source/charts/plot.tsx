@@ -15,7 +15,11 @@ export type Mark =
   | { kind: "dots"; points: [number, number][]; colour: string }
   | { kind: "whiskers"; points: [number, number, number][]; colour: string }
   | { kind: "steps"; edges: number[]; values: number[]; colour: string; filled?: boolean }
-  | { kind: "band"; low: number; high: number };
+  | { kind: "band"; low: number; high: number }
+  // Between two limits that may differ from place to place, half a step to either side; the name stands at each limit.
+  | { kind: "limits"; points: [number, number, number][]; names: [string, string] }
+  // Each says what it is under the mouse; what is marked is a diamond in another colour.
+  | { kind: "points"; points: { x: number; y: number; text: string; marked: boolean }[]; colour: string };
 
 export interface PlotProps {
   title: string; // also of the files
@@ -66,7 +70,35 @@ function MarkShape({ mark, frame }: { mark: Mark; frame: Frame }) {
     }
     case "band":
       return <rect x="0" width={frame.width} y={frame.y(mark.high)} height={Math.max(0.5, frame.y(mark.low) - frame.y(mark.high))} fill="var(--band)" />;
+    case "limits": {
+      const half = frame.x(0.5) - frame.x(0);
+      const edge = (of: 1 | 2) => mark.points.map((point) => `M${(frame.x(point[0]) - half).toFixed(1)} ${frame.y(point[of]).toFixed(1)}h${(2 * half).toFixed(1)}`).join("");
+      const last = mark.points[mark.points.length - 1];
+      return (
+        <g class="limits">
+          {mark.points.map(([x, low, high]) => <rect x={frame.x(x) - half} width={2 * half} y={frame.y(high)} height={Math.max(0.5, frame.y(low) - frame.y(high))} fill="var(--band)" />)}
+          <path d={`${edge(1)}${edge(2)}`} fill="none" stroke="var(--floor)" stroke-dasharray="4 3" />
+          {last && <g fill="var(--soft)" font-size="11.5" text-anchor="end">
+            <text x={frame.x(last[0]) + half - 3} y={frame.y(last[2]) - 4}>{mark.names[1]}</text><text x={frame.x(last[0]) + half - 3} y={frame.y(last[1]) + 13}>{mark.names[0]}</text>
+          </g>}
+        </g>
+      );
+    }
+    case "points":
+      return <>{mark.points.map(({ x, y, text, marked }) => (
+        <g class="named"><title>{text}</title>
+          {marked
+            ? <rect x={frame.x(x) - 4.5} y={frame.y(y) - 4.5} width="9" height="9" transform={`rotate(45 ${frame.x(x)} ${frame.y(y)})`} fill="var(--given)" stroke="var(--ink)" />
+            : <circle cx={frame.x(x)} cy={frame.y(y)} r="3.8" fill={mark.colour} />}
+        </g>))}</>;
   }
+}
+
+// Every label that has room, the last one always: those before it give way.
+function labelTicks(labels: string[], width: number): number[] {
+  const widest = Math.max(...labels.map((label) => label.length)) * 6.3 + 10;
+  const every = Math.max(1, Math.ceil((widest * labels.length) / width));
+  return labels.map((_, i) => i).filter((i) => (labels.length - 1 - i) % every === 0);
 }
 
 export function Plot(props: PlotProps) {
@@ -95,7 +127,7 @@ export function Plot(props: PlotProps) {
     const point = at(event);
     setHover(point >= 0 && props.describe ? props.describe(point) : "");
   };
-  const xTicks = props.x.labels ? props.x.labels.map((_, i) => i) : ticks(props.x.range, Math.max(2, width / 80));
+  const xTicks = props.x.labels ? labelTicks(props.x.labels, width) : ticks(props.x.range, Math.max(2, width / 80));
   const yTicks = ticks(props.y.range, Math.max(2, height / 45));
   return (
     <figure class="plot">
@@ -119,7 +151,7 @@ export function Plot(props: PlotProps) {
                 {props.marks.map((mark) => <MarkShape mark={mark} frame={frame} />)}
                 <g fill="var(--soft)" font-size="11.5">
                   {yTicks.map((y) => <text x="-8" y={frame.y(y) + 4} text-anchor="end">{tickText(y)}</text>)}
-                  {xTicks.map((x) => <text x={frame.x(x)} y={height + 17} text-anchor="middle">{props.x.labels ? props.x.labels[x] : tickText(x)}</text>)}
+                  {xTicks.map((x) => <text x={frame.x(x)} y={height + 17} text-anchor={props.x.labels && frame.x(x) + 3.2 * props.x.labels[x].length > width + margin.right ? "end" : "middle"} dx={props.x.labels && frame.x(x) + 3.2 * props.x.labels[x].length > width + margin.right ? width + margin.right - frame.x(x) : undefined}>{props.x.labels ? props.x.labels[x] : tickText(x)}</text>)}
                 </g>
                 <g fill="var(--soft)" font-size="12">
                   <text x={width} y={height + 34} text-anchor="end">{props.x.title}</text>

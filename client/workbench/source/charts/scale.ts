@@ -2,16 +2,23 @@
 
 export type Range = [number, number];
 
+const minTicks = 3; // fewer give an axis no scale
+
 // Round numbers within the range, about `wanted` of them.
 export function ticks([low, high]: Range, wanted: number): number[] {
   const span = high - low;
   if (!(span > 0) || !Number.isFinite(span)) return [];
-  const rough = span / Math.max(1, wanted);
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * ([1, 2, 5, 10].find((round) => round * power >= rough * 0.999) ?? 10);
-  const list: number[] = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) list.push(Number((k * step).toPrecision(12)));
-  return list;
+  const at = (rough: number) => {
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * ([1, 2, 5, 10].find((round) => round * power >= rough * 0.999) ?? 10);
+    const list: number[] = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) list.push(Number((k * step).toPrecision(12)));
+    return list;
+  };
+  for (let rough = span / Math.max(1, wanted); ; rough /= 2) {
+    const list = at(rough);
+    if (list.length >= minTicks) return list;
+  }
 }
 
 // Of all finite values, with a margin of 4 %; never empty.

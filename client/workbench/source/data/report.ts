@@ -147,12 +147,18 @@ export interface Rung {
   lack_of_fit_p: number | null;
 }
 
+export interface WordsOfData {
+  kind_name: string; floor: number; floor_is_bound: boolean; times_the_floor: string; finger_bias: string; nearest_effect: string;
+  uncertainty?: Record<string, number[]>; // x y z (mm) and standard uncertainty
+  ladder?: Rung[]; // where several kinds of data were diagnosed together
+}
+
 export interface Words {
   headline: string; summary: string; data: string; floor: string; times_the_floor: string; nothing_missing: string;
   finger_scatter: string; ladder: Rung[]; command: string; commands: { purpose: string; command: string }[];
   problems: { title: string; fix: string }[]; ambiguities: { effects: string[]; to_decide: string }[];
-  next: string[]; steps: string[]; main?: number;
-  of_data: { kind_name: string; floor: number; floor_is_bound: boolean; finger_bias: string; nearest_effect: string; uncertainty?: Record<string, number[]> }[]; // x y z (mm) and standard uncertainty
+  next: string[]; steps: string[]; to_tell: string[]; main?: number;
+  of_data: WordsOfData[];
 }
 
 export interface PageData { report: Report; words: Words }

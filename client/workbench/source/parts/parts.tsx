@@ -1,6 +1,6 @@
 // Small parts that several views share.
 import { type ComponentChildren } from "preact";
-import { hasInterval } from "../format";
+import { hasInterval, interval, withError } from "../format";
 import type { Value } from "../data/report";
 import type { Row } from "../charts/export";
 import { CopyButton, Tools } from "./tools";
@@ -39,6 +39,19 @@ export function IntervalPicture({ value }: { value: Value }) {
       <line x1={x(value.lower)} x2={x(value.upper)} y1="50%" y2="50%" stroke="var(--better)" stroke-width="3" stroke-linecap="round" />
       <circle cx={x(value.value)} cy="50%" r="3.6" fill="var(--better)" />
     </svg>
+  );
+}
+
+const maxValues = 4; // listed of one effect
+
+// The values of an effect, a row each: name, value with error and unit, its interval.
+export function ValueRows({ values }: { values: Value[] }) {
+  const listed = values.slice(0, values.length > maxValues ? maxValues - 1 : maxValues);
+  return (
+    <div class="values">
+      {listed.map((value) => <div title={interval(value) && `95 % interval ${interval(value)}`}><span class="soft">{[value.name, value.finger, value.object].filter(Boolean).join(" ")}</span><span class="nowrap">{withError(value)}</span><span><IntervalPicture value={value} /></span></div>)}
+      {listed.length < values.length && <div><span class="soft">{values.length - listed.length} more</span></div>}
+    </div>
   );
 }
 

@@ -1,7 +1,7 @@
 // The live workbench, above the report: what is missing, the model as it grows, and the error as it falls.
 import { useRef } from "preact/hooks";
-import { Bar } from "../parts/parts";
-import { effectProbability, error, number, share, typeset, withError } from "../format";
+import { Bar, ValueRows } from "../parts/parts";
+import { effectProbability, error, number, share, spaced, typeset, unitSymbol } from "../format";
 import { page } from "../state";
 import { Formula } from "./formula";
 import { type Lost, type ModelEffect, byHand, cancel, diagnose, diagnosis, failure, model, moved, openExample, origin, place, rungs, save, setValue, stale, take, undo, working } from "../data/live";
@@ -74,14 +74,14 @@ function Found() {
       <ul>
         {report.refitted.map((one) => (
           <li>
-            <span><b>{one.effect}</b> has other values: {one.parameters.slice(0, 2).map((value) => withError(value)).join(", ")}</span>
+            <span><b>{one.effect}</b> has other values<ValueRows values={one.parameters} /></span>
             <Take there={taken.has(`change ${one.effect}`)} effect={one.effect} sign="change" verb="Change" />
           </li>
         ))}
         {report.steps.map((one) => (
           <li>
             <span>
-              <b>{one.effect}</b> {one.parameters.slice(0, 2).map((value) => withError(value)).join(", ")} <span class="soft">probability {effectProbability(one.probability)}</span>
+              <b>{one.effect}</b> <span class="soft">probability {effectProbability(one.probability)}</span><ValueRows values={one.parameters} />
               {one.meaning && <span class="live-meaning">{typeset(one.meaning)}</span>}
               {one.equivalent.length > 0 && <span class="live-meaning">These data cannot tell it from {one.equivalent.join(", ")}. {typeset(one.discriminating_measurement)}</span>}
             </span>
@@ -97,8 +97,6 @@ function Take({ there, effect, sign, verb }: { there: boolean; effect: string; s
   if (there) return <span class="live-there">{"\u2713"} in the model</span>;
   return <button type="button" class="main" disabled={!!working.value} onClick={() => void take(effect, sign)}>{verb} {effect}</button>;
 }
-
-const unitOf = (unit: string) => unit.replace(/^us\b/, "\u00b5s");
 
 // 1, 2 or 5 of a power of ten: about a hundred steps.
 function niceStep(span: number): number {
@@ -123,7 +121,7 @@ function Slider({ effect, parameter, entry }: { effect: ModelEffect; parameter: 
     <label class="slider" title={one.meaning}>
       <span>{effect.name} <span class="soft">{one.name}{one.values.length > 1 ? ` ${entry + 1}` : ""}</span></span>
       <input type="range" min={low} max={high} step={niceStep(high - low)} value={value} onInput={(event) => setValue({ effect, parameter, entry, value: Number(Number(event.currentTarget.value).toPrecision(6)) })} />
-      <output>{number(value, 4)} {unitOf(one.unit)}</output>
+      <output>{number(value, 4)}{spaced(unitSymbol(one.unit))}</output>
     </label>
   );
 }

@@ -1,13 +1,13 @@
 // What touches like these can show: from which size each effect is found, and told from what resembles it.
 import { Key, Section, Table } from "../parts/parts";
-import { join, number, unitSymbol } from "../format";
+import { join, sized } from "../format";
 import { page } from "../state";
 import type { Detectable } from "../data/report";
 
 const found80 = 0.8;
 const decades: [number, number] = [-3, 1]; // of a size over what rigs show
 
-const size = (of: number | undefined, one: Detectable) => of === undefined ? "\u2013" : `${number(of, 2)}${one.unit ? `\u2009${unitSymbol(one.unit)}` : ""}`;
+const size = (of: number | undefined, one: Detectable) => of === undefined ? "\u2013" : sized(of, one.unit);
 const rivalOf = (one: Detectable) => one.rival.startsWith("given:") ? `${one.rival.slice(6)} of the model` : one.rival;
 
 function told(one: Detectable): string {

@@ -1,8 +1,8 @@
 // Several sessions of one rig: the error in each, which values changed, and a control chart of every value.
-import { useRef } from "preact/hooks";
 import { Key, Section, Table } from "../parts/parts";
-import { Tools } from "../parts/tools";
-import { count, error, number, probability, typeset, unitSymbol } from "../format";
+import { type Mark, Plot } from "../charts/plot";
+import { rangeOf } from "../charts/scale";
+import { count, error, number, plusMinus, probability, spaced, typeset, unitSymbol } from "../format";
 import { entry, page, session } from "../state";
 import type { ComparedEffect, ComparedValue, DataReport, Report, SessionValue } from "../data/report";
 
@@ -14,56 +14,40 @@ export function sessionLabel(data: DataReport[], place: number): string {
 }
 
 const valueName = (effect: ComparedEffect, value: ComparedValue) => `${value.name}${value.finger ? ` ${value.finger}` : ""}${effect.object ? ` of ${effect.object}` : ""}`;
-const withUnit = (text: string, unit: string) => unit ? `${text}\u2009${unitSymbol(unit)}` : text;
+const withUnit = (text: string, unit: string) => `${text}${spaced(unitSymbol(unit))}`;
 const tones: Record<string, string> = { CHANGED: "bad", UNCHANGED: "faint", CANNOT_SAY: "" };
 
-// As many decimals as the error leaves.
-function withError(value: number, std_error: number): string {
-  if (!(std_error > 0)) return number(value, 3);
-  const places = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(std_error))));
-  return `${value.toFixed(places).replace("-", "\u2212")} \u00b1 ${std_error.toFixed(places)}`;
-}
-
 function changeWords(effect: ComparedEffect, value: ComparedValue): string {
-  if (value.change === "CHANGED") return `changed by ${withUnit(withError(value.difference, value.std_error), value.unit)} (p ${probability(effect.p)})`;
+  if (value.change === "CHANGED") return `changed by ${withUnit(plusMinus(value.difference, value.std_error), value.unit)} (p ${probability(effect.p)})`;
   if (value.change === "UNCHANGED") return `unchanged, within ${withUnit(number(Math.max(Math.abs(value.lower), Math.abs(value.upper)), 2), value.unit)}`;
   return value.std_error > 0 ? `cannot say: ${number(value.lower, 2)} to ${withUnit(number(value.upper, 2), value.unit)}` : "cannot say";
 }
 
-const width = 360, height = 120, edge = 10;
-
-// A point a session with its standard error; the band is what the other sessions let expect.
+// A point a session with two standard errors to either side; the limits are what the other sessions let expect.
 function ControlChart({ report, effect, value }: { report: Report; effect: ComparedEffect; value: ComparedValue }) {
-  const drawn = useRef<SVGSVGElement>(null);
+  const { sessions } = value;
   const limited = (one: SessionValue) => one.limit_upper > one.limit_lower;
-  const low = Math.min(...value.sessions.map((one) => Math.min(one.value - 2 * one.std_error, limited(one) ? one.limit_lower : Infinity)));
-  const high = Math.max(...value.sessions.map((one) => Math.max(one.value + 2 * one.std_error, limited(one) ? one.limit_upper : -Infinity)));
-  if (!(high > low)) return null;
-  const step = (width - 2 * edge) / Math.max(1, value.sessions.length);
-  const x = (place: number) => edge + (place + 0.5) * step;
-  const y = (of: number) => edge + (1 - (of - low) / (high - low)) * (height - 2 * edge);
+  const label = (one: SessionValue) => sessionLabel(report.data, one.session);
+  const told = (one: SessionValue) => `${label(one)}: ${withUnit(plusMinus(one.value, one.std_error), value.unit)}${one.outside ? ", outside its limits" : ""}`;
+  const range = rangeOf(sessions.flatMap((one) => [one.value - 2 * one.std_error, one.value + 2 * one.std_error, ...(limited(one) ? [one.limit_lower, one.limit_upper] : [])]), 0.14);
   const name = `${effect.effect} ${valueName(effect, value)}`;
-  const outside = value.sessions.filter((one) => one.outside).map((one) => sessionLabel(report.data, one.session));
-  const said = `${name}: ${value.sessions.map((one) => `${sessionLabel(report.data, one.session)} ${withError(one.value, one.std_error)}${one.outside ? ", outside its limits" : ""}`).join("; ")}`;
+  const outside = sessions.filter((one) => one.outside).map(label);
+  const limits = sessions.map((one, i): [number, number, number] => [i, one.limit_lower, one.limit_upper]).filter((_, i) => limited(sessions[i]));
+  const marks: Mark[] = [
+    ...(limits.length ? [{ kind: "limits", points: limits, names: ["lower limit", "upper limit"] } as Mark] : []),
+    { kind: "line", points: sessions.map((one, i) => [i, one.value]), colour: "var(--axis)" },
+    { kind: "whiskers", points: sessions.map((one, i) => [i, one.value - 2 * one.std_error, one.value + 2 * one.std_error]), colour: "var(--ink)" },
+    { kind: "points", points: sessions.map((one, i) => ({ x: i, y: one.value, text: told(one), marked: one.outside })), colour: "var(--better)" },
+  ];
   return (
-    <figure class="chart control">
-      <div class="plot-head"><div class="plot-title">{name}{value.unit && <span class="faint">, {unitSymbol(value.unit)}</span>}</div>
-        <Tools title={name} svg={() => drawn.current} rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...value.sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]} /></div>
-      <svg ref={drawn} viewBox={`0 0 ${width} ${height}`} role="img" aria-label={said}>
-        {value.sessions.map((one, i) => limited(one) && <rect x={x(i) - step / 2} width={step} y={y(one.limit_upper)} height={Math.max(1, y(one.limit_lower) - y(one.limit_upper))} fill="var(--pale)" />)}
-        <polyline points={value.sessions.map((one, i) => `${x(i)},${y(one.value)}`).join(" ")} fill="none" stroke="var(--axis)" />
-        {value.sessions.map((one, i) => (
-          <g>
-            <title>{`${sessionLabel(report.data, one.session)}: ${withError(one.value, one.std_error)}`}</title>
-            <line x1={x(i)} x2={x(i)} y1={y(one.value - 2 * one.std_error)} y2={y(one.value + 2 * one.std_error)} stroke="var(--ink)" stroke-width="1.2" />
-            {one.outside
-              ? <rect x={x(i) - 4.5} y={y(one.value) - 4.5} width="9" height="9" transform={`rotate(45 ${x(i)} ${y(one.value)})`} fill="var(--given)" stroke="var(--ink)" />
-              : <circle cx={x(i)} cy={y(one.value)} r="3.6" fill="var(--better)" />}
-          </g>))}
-      </svg>
-      <figcaption>{number(low, 3)} to {withUnit(number(high, 3), value.unit)}, {sessionLabel(report.data, value.sessions[0].session)} to {sessionLabel(report.data, value.sessions[value.sessions.length - 1].session)}.{outside.length > 0 && <b> Outside: {outside.join(", ")}.</b>}
-        {value.between_sessions > 0 && ` Scatters by ${withUnit(number(value.between_sessions, 2), value.unit)} between sessions, beyond its standard errors.`}</figcaption>
-    </figure>
+    <div class="control">
+      <Plot title={name} label={`${name}: ${sessions.map(told).join("; ")}`} height={230} marks={marks} head={<b>{name}</b>}
+        x={{ title: "session", range: [-0.5, sessions.length - 0.5], labels: sessions.map((one) => label(one).replace(/\.(csv|db)$/, "")) }}
+        y={{ title: value.unit ? `value (${unitSymbol(value.unit)})` : "value", range }}
+        rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]}
+        caption={<>{outside.length > 0 ? <b>Outside: {outside.join(", ")}.</b> : limits.length > 0 && "All within their limits."}{limits.length === 0 && "Limits take five sessions."}
+          {value.between_sessions > 0 && ` Scatters by ${withUnit(number(value.between_sessions, 2), value.unit)} between sessions, beyond its standard errors.`}</>} />
+    </div>
   );
 }
 
@@ -75,7 +59,7 @@ export function Sessions() {
   const rows = compared.effects.flatMap((effect) => effect.values.map((value) => ({ effect, value })));
   const charted = rows.filter(({ value }) => value.sessions.length > 2);
   const of = (value: ComparedValue, place: number) => value.sessions.find((one) => one.session === place);
-  const shown = (value: ComparedValue, place: number) => { const one = of(value, place); return one ? withError(one.value, one.std_error) : "\u2013"; };
+  const shown = (value: ComparedValue, place: number) => { const one = of(value, place); return one ? plusMinus(one.value, one.std_error) : "\u2013"; };
   const few = data.length <= 3;
   return (
     <Section id="sessions" title="Between the sessions" lead={typeset(compared.words)}>
@@ -92,7 +76,7 @@ export function Sessions() {
         csv={() => [["effect", "value", "object", "session", "estimate", "std_error", "change", "p"], ...rows.flatMap(({ effect, value }) => value.sessions.map((one) => [effect.effect, valueName(effect, value), effect.object, data[one.session].session, one.value, one.std_error, value.change, effect.p]))]} />}
       {charted.length > 0 && <>
         <h3>History</h3>
-        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--pale)", text: "what the other sessions let expect, three standard deviations" }]} /></p>
+        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--band)", text: "between its limits: what the other sessions let expect, three standard deviations" }]} /></p>
         <div class="charts">{charted.map(({ effect, value }) => <ControlChart report={report} effect={effect} value={value} />)}</div>
       </>}
     </Section>

@@ -1,31 +1,25 @@
 // Why: every effect of the catalogue as the one that is missing, and which of them these data cannot tell apart.
-import { Bar, Code, IntervalPicture, Key, Section, Table, Terms } from "../parts/parts";
+import { Bar, Code, Key, Section, Table, Terms, ValueRows } from "../parts/parts";
 import { Plot, type Mark } from "../charts/plot";
 import { rangeOf } from "../charts/scale";
-import { covariate, covariateName, effectProbability, error, interval, join, number, probability, readings, share, typeset, valueName, withError } from "../format";
-import { shownData, page } from "../state";
+import { covariate, covariateName, effectProbability, error, join, number, probability, readings, share, typeset, valueName, withError } from "../format";
+import { joint, shownData, page } from "../state";
 import { fingerColour } from "../colour";
 import type { Candidate, DataReport } from "../data/report";
 
-const maxValues = 4; // of a candidate
-const unseen = (one: { rmse: number; heldout_rmse: number }) => (one.heldout_rmse > 0 ? one.heldout_rmse : one.rmse);
+export const unseen = (one: { rmse: number; heldout_rmse: number }) => (one.heldout_rmse > 0 ? one.heldout_rmse : one.rmse);
 
 const scopeWords = (one: Candidate) =>
   one.scope?.kind !== "OBJECT" ? "" : one.scope.objects.length === 1 ? `of ${one.scope.objects[0]} only` : "a value per object";
 
-function Values({ one }: { one: Candidate }) {
-  const values = one.parameters.slice(0, one.parameters.length > maxValues ? maxValues - 1 : maxValues);
-  return (
-    <div class="values">
-      {values.map((value) => <div title={interval(value) && `95 % interval ${interval(value)}`}><span class="soft">{[value.name, value.finger, value.object].filter(Boolean).join(" ")}</span> <span class="nowrap">{withError(value)}</span> <IntervalPicture value={value} /></div>)}
-      {values.length < one.parameters.length && <div class="soft">{one.parameters.length - values.length} more</div>}
-    </div>
-  );
+// Of all kinds of data, the most probable first.
+export function rankedCandidates(data: DataReport[]): { one: Candidate; data: DataReport }[] {
+  return data.flatMap((of) => of.candidates.map((one) => ({ one, data: of }))).sort((a, b) => b.one.probability - a.one.probability);
 }
 
 function Candidates() {
   const { report } = page.value!;
-  const ranked = report.data.flatMap((data) => data.candidates.map((one) => ({ one, data })));
+  const ranked = rankedCandidates(report.data);
   const fitted = ranked.filter(({ one }) => one.rmse > 0 || !one.note);
   const largest = new Map(report.data.map((data) => [data, Math.max(unseen(data.initial), ...data.candidates.map(unseen))]));
   const none = report.verdict === "UNEXPLAINED" && !report.steps.length;
@@ -43,10 +37,10 @@ function Candidates() {
         rows={fitted.map(({ one, data }) => {
           const left = unseen(one);
           return [
-            <><b class="effect">{one.effect}</b>{scopeWords(one) && <small> {scopeWords(one)}</small>}{alike.has(one.effect) && <small> one of these</small>}</>,
+            <><b class="effect">{one.effect}</b><small> {[scopeWords(one), alike.has(one.effect) && "one of these"].filter(Boolean).join(", ")}</small></>,
             effectProbability(one.probability), left > 0 ? error(data.kind, left) : "",
             left > 0 && <Bar share={left / largest.get(data)!} tone={faint(one) ? "area" : "better"} mark={data.noise_floor / largest.get(data)!} />,
-            one.note ? typeset(one.note) : <Values one={one} />,
+            one.note ? typeset(one.note) : <ValueRows values={one.parameters} />,
           ];
         })}
         caption={<>Each effect alone, {shared.length ? `with ${join(shared, "and")} in place` : "as the first to be added"}. It would leave: the RMSE on what was left out of the fit, dashed the noise floor. The upright line of an interval is zero, no effect.{alike.size > 0 && ` Effects marked as one of these fit alike and share a probability of ${effectProbability(first.probability)}.`}</>} />}
@@ -61,7 +55,7 @@ export function Why() {
   if (!known && !words.ambiguities.length) return null;
   const none = report.verdict === "UNEXPLAINED" && !report.steps.length;
   return (
-    <Section id="why" title={none ? "What was tried" : "Why"} lead={`Every effect of the catalogue${none ? " alone, judged on" : ", fitted and judged on"} ${readings(report.data[words.main ?? 0])} that the fit did not see${none ? ": none explains the error." : "."}`}>
+    <Section id="why" title={none ? "What was tried" : "Why"} lead={`Every effect of the catalogue${none ? " alone, judged on" : ", fitted and judged on"} ${join([...new Set((joint.value ? report.data : [report.data[words.main ?? 0]]).map(readings))], "and")} that the fit did not see${none ? ": none explains the error." : "."}`}>
       <Candidates />
       {words.ambiguities.length > 0 && <><h3>What these data cannot tell apart</h3><Terms terms={words.ambiguities.map((one) => [join(one.effects, "or"), typeset(one.to_decide)])} /></>}
     </Section>
