@@ -1,13 +1,16 @@
+#include <absl/strings/match.h>
 #include <absl/strings/str_join.h>
 #include <gtest/gtest.h>
 
 #include <iostream>
 #include <map>
+#include <set>
 
 #include "server/base/sanitizers.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/images/photograph_modality.h"
 #include "server/diagnosis/joint/shared_effects.h"
+#include "server/diagnosis/joint_reports.h"
 #include "server/diagnosis/joint_test_set.h"
 #include "server/diagnosis/selection/touch_modality.h"
 
@@ -77,6 +80,30 @@ TEST(SharedEffects, ObjectPutDownAskewIsFoundByBothAndTighterThanByEither) {
     ASSERT_EQ(e.std_error_alone.size(), 2u);
     for (const auto& [kind, std_error] : e.std_error_alone) EXPECT_LT(e.std_error, std_error) << kind;
   }
+}
+
+// A common search that was told of by its beginning alone stood still for minutes.
+TEST(JointDiagnosis, ProgressNeverFallsAndMovesThroughTheCommonSearch) {
+  if (kUnderSanitizers) GTEST_SKIP() << kSamePath;
+  HiddenSession session = WithHidden({});
+  session.rig.hidden = {{"tool_yaw", {"angle_deg=1"}}};
+  const DiagnosisInput input = MakeJointInput(session);
+  ThreadPool pool(2);
+  DiagnosisContext context;
+  context.pool = &pool;
+  double last = 0;
+  bool falls = false;
+  std::set<double> of_both;
+  context.progress = [&](const std::string& stage, double done) {
+    falls |= done < last;
+    last = done;
+    if (absl::StartsWith(stage, "fitting both together")) of_both.insert(done);
+    return true;
+  };
+  const auto diagnosis = DiagnoseJointSet(input, context);
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status();
+  EXPECT_FALSE(falls);
+  EXPECT_GE(of_both.size(), 5u) << "the effects that were tried";
 }
 
 TEST(SharedEffects, NothingIsFoundWhereNothingIsMissing) {

@@ -1,10 +1,8 @@
 #include "server/diagnosis/touch_reports.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 #include <optional>
 
 #include <absl/strings/str_cat.h>
@@ -18,6 +16,7 @@
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
+#include "server/diagnosis/progress_gate.h"
 #include "server/diagnosis/report/kinds/from_distributions.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
@@ -32,37 +31,6 @@ namespace {
 
 constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is confounded
 constexpr char kCancelled[] = "the diagnosis was cancelled";
-
-// Passes progress on from whatever thread works, one at a time, and remembers a cancellation.
-class ProgressGate {
- public:
-  explicit ProgressGate(const DiagnosisContext& context) : context_(context) {}
-
-  // A stage and the share that is done by now. Returns false once cancelled.
-  bool Enter(const std::string& stage, double done) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stage_ = stage;
-    done_ = std::max(done_, done);
-    return Report();
-  }
-  // The same stage continues. Busy threads do not wait for each other.
-  bool Continue() {
-    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (lock.owns_lock()) Report();
-    return !cancelled_;
-  }
-
- private:
-  bool Report() {
-    if (context_.progress && !cancelled_ && !context_.progress(stage_, done_)) cancelled_ = true;
-    return !cancelled_;
-  }
-  const DiagnosisContext& context_;
-  std::mutex mutex_;
-  std::string stage_ = "reading";
-  double done_ = 0;
-  std::atomic<bool> cancelled_{false};
-};
 
 double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();

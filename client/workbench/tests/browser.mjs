@@ -12,6 +12,7 @@ const touches = sample("touches");
 const photographs = sample("photographs");
 const plan = sample("plan");
 const sessions = sample("sessions");
+const joint = sample("joint");
 let browser;
 
 before(async () => {
@@ -194,7 +195,7 @@ test("data that are cut off, and a report of nothing, are said in words", async 
 });
 
 test("a phone shows all of it without scrolling sideways", async () => {
-  for (const [data, name] of [[touches, "phone"], [photographs, "phone-photographs"]])
+  for (const [data, name] of [[touches, "phone"], [photographs, "phone-photographs"], [joint, "phone-joint"], [sessions, "phone-sessions"]])
     await opened(data, async (page) => {
       assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
     }, { width: 390, height: 844, name });
@@ -217,8 +218,8 @@ test("the page of several sessions names what changed, and charts every value wi
     assert.match(await page.locator("h1").innerText(), /lacks tip_radius; with it in 2026-11-05\.csv the error falls/);
     const part = page.locator("#sessions");
     assert.match(await part.innerText(), /Changed: tip_radius radius_mm from .* in 2026-11-01\.csv to .* in 2026-11-04\.csv/);
-    assert.equal(await part.locator(".control svg").count(), 1);
-    assert.equal(await part.locator(".control svg g").count(), 5);
+    assert.equal(await part.locator(".control .plot-body svg").count(), 1);
+    assert.equal(await part.locator(".control svg .named").count(), 5);
     assert.match(await part.locator(".control figcaption").innerText(), /Outside: 2026-11-04\.csv/);
     // A session that is chosen is the one whose touches are shown, and the address holds it.
     await part.getByRole("button", { name: "2026-11-04.csv" }).click();
@@ -226,6 +227,58 @@ test("the page of several sessions names what changed, and charts every value wi
     assert.equal(await part.getByRole("button", { name: "2026-11-04.csv" }).getAttribute("aria-pressed"), "true");
     assert.deepEqual(await violations(page), []);
   }, { name: "sessions" });
+});
+
+test("a control chart has axes with units, names its limits, and can be read in light, dark and on a phone", async () => {
+  for (const [scheme, width] of [["light", 1280], ["dark", 1280], ["light", 400], ["dark", 400]])
+    await opened(sessions, async (page) => {
+      const chart = page.locator("#sessions .control svg[role=img]").first();
+      const texts = await chart.locator("text").allTextContents();
+      for (const wanted of ["session", "value (mm)", "upper limit", "lower limit", "2026-11-05"]) assert.ok(texts.includes(wanted), `${wanted} of ${texts}`);
+      assert.ok(texts.filter((text) => /^[\u2212\d.]+$/.test(text)).length >= 3, `the axis of values has a scale: ${texts}`);
+      // No label lies over another, and none beyond the picture.
+      const faults = await chart.evaluate((svg) => {
+        const within = svg.getBoundingClientRect();
+        const boxes = [...svg.querySelectorAll("text")].map((text) => [text.textContent, text.getBoundingClientRect()]);
+        const over = boxes.flatMap(([a, p], i) => boxes.slice(i + 1).filter(([, q]) => p.left < q.right - 1 && q.left < p.right - 1 && p.top < q.bottom - 3 && q.top < p.bottom - 3).map(([b]) => `${a} over ${b}`));
+        return [...over, ...boxes.filter(([, box]) => box.left < within.left - 1 || box.right > within.right + 1).map(([a]) => `${a} is cut`)];
+      });
+      assert.deepEqual(faults, []);
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
+      assert.deepEqual(await violations(page), []);
+    }, { scheme, width, name: `control-${scheme}-${width}` });
+});
+
+test("a joint report tells of touches and pictures, each in its unit", async () => {
+  for (const width of [1280, 400])
+    await opened(joint, async (page) => {
+      const figures = await page.locator(".figures").innerText();
+      for (const wanted of [/11\.1\sms/, /6\.03\sgrey/, /2\.95\sms/, /1\.43\sgrey/, /2\.76\sms/]) assert.match(figures, wanted);
+      const rungs = await page.locator("#ladder .joint-rung.step, #ladder .joint-rung.given, #ladder .joint-rung.floor").allInnerTexts();
+      assert.equal(rungs.length, 3);
+      for (const rung of rungs) { assert.match(rung, /\d\sms/); assert.match(rung, /\d\sgrey/); }
+      assert.match(await page.locator(".facts").innerText(), /Noise floor of the touches 2\.76\sms.* Noise floor of the pictures 1\.43\sgrey/);
+      assert.match(await page.locator("#why .lead").innerText(), /touches and pictures that the fit did not see/);
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width);
+      assert.deepEqual(await violations(page), []);
+    }, { width, name: `joint-${width}` });
+});
+
+test("effects stand by falling probability, whatever kind of data they explain, a row for every value", async () => {
+  await opened(joint, async (page) => {
+    const rows = await page.locator("#why tbody tr").evaluateAll((all) => all.map((row) => [row.cells[1].innerText, [...row.querySelectorAll(".values > div")].map((one) => one.innerText)]));
+    const shown = rows.map(([p]) => Number(p.replace(/[<>\s]/g, "")));
+    assert.deepEqual(shown, [...shown].sort((a, b) => b - a));
+    assert.ok(new Set(joint.report.data.map((data) => data.candidates.find((one) => one.rmse > 0)?.effect)).size > 1, "both kinds have candidates");
+    for (const [, values] of rows) for (const value of values) assert.match(value, /^\w+( \w+)*\s+[\u2212\d]|^\d+ more$/);
+  }, { name: "why-joint" });
+});
+
+test("what would decide names what it tells from what", async () => {
+  await opened(photographs, async (page) => {
+    const terms = page.locator("#step-0 dt");
+    assert.ok((await terms.allInnerTexts()).includes("To tell exposure from the albedo of all objects"));
+  }, { name: "to-tell" });
 });
 
 test("a printed page is light, as wide as paper, and loses no view", async () => {

@@ -37,7 +37,7 @@ const std::vector<engine::HypothesisRule>& JointHypothesisRules() {
 class SharedFinder {
  public:
   SharedFinder(const std::vector<const engine::Modality*>& kinds, const model::Model& given,
-               const std::function<bool(double)>& progress)
+               const std::function<bool(const std::string&, double)>& progress)
       : kinds_(kinds), given_(given), progress_(progress) {
     const auto is_shared = [this](const model::Effect& effect) {
       return std::count_if(kinds_.begin(), kinds_.end(),
@@ -54,9 +54,11 @@ class SharedFinder {
     for (const Side& side : sides_)
       settled.insert(side.settled->settled.begin(), side.settled->settled.end());
     found_.settled.assign(settled.begin(), settled.end());
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(0));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const SharedSelection selection, SearchShared(sides_));
-    TOUCHSTONE_RETURN_IF_ERROR(Enter(0.7));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const SharedSelection selection,
+                                SearchShared(sides_, [this](const std::string& tried, double done) {
+                                  return Enter(tried, kSearched * done);
+                                }));
+    TOUCHSTONE_RETURN_IF_ERROR(Enter("", kSearched));
     using J = JointHypothesis;
     TOUCHSTONE_RETURN_IF_ERROR(hypotheses_.Ask({{J::kConflict, [&] { return AskConflict(selection); }},
                                                 {J::kUndecided, [&] { return FindUndecided(selection); }},
@@ -65,9 +67,13 @@ class SharedFinder {
   }
 
  private:
-  absl::Status Enter(double done) const {
-    return !progress_ || progress_(done) ? absl::OkStatus()
-                                         : absl::CancelledError("the diagnosis was cancelled");
+  static constexpr double kSearched = 0.9;  // of the progress
+
+  // `tried`: an effect; empty: none.
+  absl::Status Enter(const std::string& tried, double done) const {
+    const std::string stage = absl::StrCat("fitting both together", tried.empty() ? "" : ": ", tried);
+    return !progress_ || progress_(stage, done) ? absl::OkStatus()
+                                                : absl::CancelledError("the diagnosis was cancelled");
   }
 
   absl::Status AskConflict(const SharedSelection& selection) {
@@ -122,6 +128,7 @@ class SharedFinder {
 
   absl::Status Describe(const SharedSelection& selection) {
     if (selection.best.shared.empty()) return absl::OkStatus();
+    TOUCHSTONE_RETURN_IF_ERROR(Enter("the values", kSearched));
     TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit fit, Polish(selection.best));
     std::vector<SharedEffect> in_place;
     for (const SharedEffect& shared : selection.best.shared) {
@@ -255,7 +262,7 @@ class SharedFinder {
 
   const std::vector<const engine::Modality*>& kinds_;
   const model::Model& given_;
-  const std::function<bool(double)>& progress_;
+  const std::function<bool(const std::string&, double)>& progress_;
   Sides sides_;
   SharedEffects found_;
   engine::Hypotheses hypotheses_{JointHypothesisRules()};
@@ -265,7 +272,7 @@ class SharedFinder {
 
 absl::StatusOr<SharedEffects> FindSharedEffects(const std::vector<const engine::Modality*>& kinds,
                                                 const model::Model& given,
-                                                const std::function<bool(double done)>& progress) {
+                                                const std::function<bool(const std::string& stage, double done)>& progress) {
   return SharedFinder(kinds, given, progress).Run();
 }
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <optional>
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
@@ -189,7 +191,9 @@ absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<Sha
   return best;
 }
 
-absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
+absl::StatusOr<SharedSelection> SearchShared(
+    const Sides& sides, const std::function<absl::Status(const std::string& tried, double done)>& enter) {
+  TOUCHSTONE_RETURN_IF_ERROR(enter("", 0));
   std::vector<OwnEffects> own;
   for (const Side& side : sides) own.push_back(side.own_alone());
   SharedSelection selection;
@@ -203,13 +207,16 @@ absl::StatusOr<SharedSelection> SearchShared(const Sides& sides) {
     for (const Form& form : forms) {
       std::vector<SharedEffect> shared = selection.best.shared;
       shared.push_back(form.effect);
-      TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation with, ExplainWith(sides, shared, selection.best.own));
-      // What each kind shows by itself may have stood in for the effect.
-      for (const std::vector<OwnEffects>& start : {own, std::vector<OwnEffects>(sides.size())}) {
-        TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh, ExplainWith(sides, shared, start));
-        if (afresh.fit.log_evidence > with.fit.log_evidence) with = std::move(afresh);
+      // From what the best has; and, since what each kind shows by itself may have stood in for the effect, afresh.
+      const std::vector<OwnEffects> starts[] = {selection.best.own, own, std::vector<OwnEffects>(sides.size())};
+      std::optional<JointExplanation> with;
+      for (size_t start = 0; start < std::size(starts); ++start) {
+        const double of_round = (static_cast<double>(tried.size()) + start / 3.0) / static_cast<double>(forms.size());
+        TOUCHSTONE_RETURN_IF_ERROR(enter(form.effect.name(), 1 - std::ldexp(2 - of_round, -round - 1)));
+        TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh, ExplainWith(sides, shared, starts[start]));
+        if (!with || afresh.fit.log_evidence > with->fit.log_evidence) with = std::move(afresh);
       }
-      tried.push_back(std::move(with));
+      tried.push_back(*std::move(with));
       if (IsWorthIt(sides, selection.best, tried.back(), forms.size()) &&
           (chosen < 0 || tried.back().fit.log_evidence > tried[chosen].fit.log_evidence))
         chosen = static_cast<int>(tried.size()) - 1;

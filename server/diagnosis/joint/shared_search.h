@@ -1,6 +1,8 @@
 // The search for shared effects, on two sides that are prepared.
 #pragma once
 
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "server/diagnosis/joint/side.h"
@@ -29,7 +31,10 @@ using Sides = std::vector<Side>;
 absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
                                              std::vector<OwnEffects> own);
 
-absl::StatusOr<SharedSelection> SearchShared(const Sides& sides);
+// `enter` is told which effect is tried and how much of the search is done, 0 to 1; its error ends the search. How many effects
+// will be found is not known: each that is found halves what is left.
+absl::StatusOr<SharedSelection> SearchShared(
+    const Sides& sides, const std::function<absl::Status(const std::string& tried, double done)>& enter);
 
 std::vector<Part> PartsOf(const Sides& sides, const JointExplanation& explained);
 

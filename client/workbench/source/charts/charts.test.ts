@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { csvText } from "./export";
-import { rangeOf, ticks } from "./scale";
+import { rangeOf, ticks, tickTexts } from "./scale";
 
 test("ticks are round and within the range", () => {
   expect(ticks([-1.3, 4.2], 3)).toEqual([0, 2, 4]);
@@ -8,6 +8,11 @@ test("ticks are round and within the range", () => {
   expect(ticks([3, 3], 5)).toEqual([]);
   // One tick is no scale.
   expect(ticks([-80, 95], 3.1)).toEqual([-50, 0, 50]);
+});
+
+test("the labels of an axis have as many decimals", () => {
+  expect(tickTexts([-0.5, 0, 0.25])).toEqual(["\u22120.50", "0.00", "0.25"]);
+  expect(tickTexts([0, 200, 400])).toEqual(["0", "200", "400"]);
 });
 
 test("a range holds all that is known and is never empty", () => {

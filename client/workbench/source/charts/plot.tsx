@@ -6,7 +6,7 @@ import { theme } from "../state";
 import { Tools } from "../parts/tools";
 import { type Cloud, type Frame, cloudSvg, drawCloud, nearest } from "./cloud";
 import type { Row } from "./export";
-import { type Range, ticks, tickText } from "./scale";
+import { type Range, ticks, tickTexts } from "./scale";
 
 export interface Axis { title: string; range: Range; labels?: string[] }
 
@@ -31,7 +31,8 @@ export interface PlotProps {
   head?: ComponentChildren; caption?: ComponentChildren;
 }
 
-const margin = { left: 52, right: 12, top: 10, bottom: 40 };
+const right = 12, top = 10, bottom = 40;
+const letter = 6.4; // px of a label
 
 // Its width is that of its place.
 function useWidth(): [(element: HTMLDivElement | null) => void, number] {
@@ -96,7 +97,7 @@ function MarkShape({ mark, frame }: { mark: Mark; frame: Frame }) {
 
 // Every label that has room, the last one always: those before it give way.
 function labelTicks(labels: string[], width: number): number[] {
-  const widest = Math.max(...labels.map((label) => label.length)) * 6.3 + 10;
+  const widest = Math.max(...labels.map((label) => label.length)) * letter + 10;
   const every = Math.max(1, Math.ceil((widest * labels.length) / width));
   return labels.map((_, i) => i).filter((i) => (labels.length - 1 - i) % every === 0);
 }
@@ -106,8 +107,12 @@ export function Plot(props: PlotProps) {
   const svg = useRef<SVGSVGElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const [hover, setHover] = useState("");
-  const width = Math.max(40, full - margin.left - margin.right);
-  const height = Math.max(40, props.height - margin.top - margin.bottom);
+  const height = Math.max(40, props.height - top - bottom);
+  const yTicks = ticks(props.y.range, Math.max(2, height / 45));
+  const yTexts = tickTexts(yTicks);
+  // Room for the widest label beside the title.
+  const left = Math.max(52, 28 + letter * Math.max(0, ...yTexts.map((text) => text.length)));
+  const width = Math.max(40, full - left - right);
   const along = (range: Range, size: number) => (value: number) => ((value - range[0]) / (range[1] - range[0])) * size;
   const across = along(props.x.range, width);
   const up = along(props.y.range, height);
@@ -128,13 +133,15 @@ export function Plot(props: PlotProps) {
     setHover(point >= 0 && props.describe ? props.describe(point) : "");
   };
   const xTicks = props.x.labels ? labelTicks(props.x.labels, width) : ticks(props.x.range, Math.max(2, width / 80));
-  const yTicks = ticks(props.y.range, Math.max(2, height / 45));
+  const xTexts = props.x.labels ? xTicks.map((x) => props.x.labels![x]) : tickTexts(xTicks);
+  // The last name of a place may end at the edge.
+  const atEdge = (i: number) => !!props.x.labels && frame.x(xTicks[i]) + (letter / 2) * xTexts[i].length > width + right;
   return (
     <figure class="plot">
       <div class="plot-head">
         <div class="plot-title">{props.head ?? props.title}</div>
         <Tools title={props.title} rows={props.rows} svg={() => svg.current} under={() =>
-          props.cloud ? `<g transform="translate(${margin.left} ${margin.top})" fill="none">${cloudSvg(props.cloud, frame)}</g>` : ""} />
+          props.cloud ? `<g transform="translate(${left} ${top})" fill="none">${cloudSvg(props.cloud, frame)}</g>` : ""} />
       </div>
       <div class="plot-body" ref={attach} style={{ height: `${props.height}px` }}>
         {full > 0 && (
@@ -142,20 +149,20 @@ export function Plot(props: PlotProps) {
             {props.cloud && (
               <canvas ref={canvas} class={props.onPick ? "cloud pick" : "cloud"} aria-hidden="true" onClick={(event) => { const point = at(event); if (point >= 0) props.onPick?.(point); }}
                 onMouseMove={props.describe ? move : undefined} onMouseLeave={() => setHover("")}
-                style={{ left: `${margin.left}px`, top: `${margin.top}px`, width: `${width}px`, height: `${height}px` }} />
+                style={{ left: `${left}px`, top: `${top}px`, width: `${width}px`, height: `${height}px` }} />
             )}
             <svg ref={svg} width={full} height={props.height} viewBox={`0 0 ${full} ${props.height}`} role="img" aria-label={props.label}>
-              <g transform={`translate(${margin.left} ${margin.top})`}>
+              <g transform={`translate(${left} ${top})`}>
                 {yTicks.map((y) => <line x1="0" x2={width} y1={frame.y(y)} y2={frame.y(y)} stroke={y === 0 ? "var(--axis)" : "var(--grid)"} />)}
                 {!props.x.labels && xTicks.map((x) => <line y1="0" y2={height} x1={frame.x(x)} x2={frame.x(x)} stroke="var(--grid)" />)}
                 {props.marks.map((mark) => <MarkShape mark={mark} frame={frame} />)}
                 <g fill="var(--soft)" font-size="11.5">
-                  {yTicks.map((y) => <text x="-8" y={frame.y(y) + 4} text-anchor="end">{tickText(y)}</text>)}
-                  {xTicks.map((x) => <text x={frame.x(x)} y={height + 17} text-anchor={props.x.labels && frame.x(x) + 3.2 * props.x.labels[x].length > width + margin.right ? "end" : "middle"} dx={props.x.labels && frame.x(x) + 3.2 * props.x.labels[x].length > width + margin.right ? width + margin.right - frame.x(x) : undefined}>{props.x.labels ? props.x.labels[x] : tickText(x)}</text>)}
+                  {yTicks.map((y, i) => <text x="-8" y={frame.y(y) + 4} text-anchor="end">{yTexts[i]}</text>)}
+                  {xTicks.map((x, i) => <text x={atEdge(i) ? width + right : frame.x(x)} y={height + 17} text-anchor={atEdge(i) ? "end" : "middle"}>{xTexts[i]}</text>)}
                 </g>
                 <g fill="var(--soft)" font-size="12">
                   <text x={width} y={height + 34} text-anchor="end">{props.x.title}</text>
-                  <text text-anchor="middle" transform={`translate(${12 - margin.left} ${height / 2}) rotate(-90)`}>{props.y.title}</text>
+                  <text text-anchor="middle" transform={`translate(${12 - left} ${height / 2}) rotate(-90)`}>{props.y.title}</text>
                 </g>
               </g>
             </svg>

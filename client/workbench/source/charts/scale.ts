@@ -36,6 +36,12 @@ export function rangeOf(values: Iterable<number>, margin = 0.04): Range {
   return [low - extra, high + extra];
 }
 
+// Of one axis: all with as many decimals.
+export function tickTexts(list: number[]): string[] {
+  const decimals = Math.max(0, ...list.map((value) => (String(value).split("e")[0].split(".")[1] ?? "").length));
+  return list.map((value) => (Math.abs(value) >= 1e6 || list.some((one) => one !== 0 && Math.abs(one) < 1e-4) ? tickText(value) : value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212")));
+}
+
 export function tickText(value: number): string {
   const size = Math.abs(value);
   const text = size !== 0 && (size >= 1e6 || size < 1e-4) ? value.toExponential() : String(value);

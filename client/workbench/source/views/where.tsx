@@ -53,7 +53,7 @@ function Groups({ data, linked }: { data: DataReport; linked: boolean }) {
       <h3>By group</h3>
       <div class="grid groups">
         {shown.map(([kind, groups]) => (
-          <Table title={groupTitle(kind)} columns={["", "", { title: "RMSE", number: true }, { title: "of excess", number: true }]}
+          <Table title={`${groupTitle(kind)}${shownData.value.length > 1 ? `, ${readings(data)}` : ""}`} columns={["", "", { title: "RMSE", number: true }, { title: "of excess", number: true }]}
             csv={() => [["group", "count", `rmse_${data.unit}`, `mean_residual_${data.unit}`, "share_of_excess"], ...groups.map((group) => [group.name, group.count, group.rmse, group.mean_residual, group.share_of_excess_error])]}
             rows={groups.map((group) => [name(kind, group), <Bar share={group.rmse / largest} tone="given" mark={data.noise_floor / largest} />, error(data.kind, group.rmse), share(group.share_of_excess_error)])} />
         ))}
