@@ -52,12 +52,12 @@ json UncertaintyJson(const v1::DataReport& data) {
 json DataJson(const v1::Report& report, const v1::DataReport& data) {
   const Floor floor = NoiseFloorOf(data);
   json words = {{"kind_name", KindName(data.kind())},
-          {"floor", floor.sigma},
-          {"floor_is_bound", floor.bound},
-          {"finger_bias", FingerBiasWords(data)},
-          {"nearest_effect", NearestEffectWords(data.unexplained())},
-          {"times_the_floor", TimesTheFloor(report, data)},
-          {"uncertainty", UncertaintyJson(data)}};
+                {"floor", floor.sigma},
+                {"floor_is_bound", floor.bound},
+                {"finger_bias", FingerBiasWords(data)},
+                {"nearest_effect", NearestEffectWords(data.unexplained())},
+                {"times_the_floor", TimesTheFloor(report, data)},
+                {"uncertainty", UncertaintyJson(data)}};
   // Of one kind alone it is the report's.
   if (IsJoint(report)) words["ladder"] = LadderJson(report, data);
   return words;

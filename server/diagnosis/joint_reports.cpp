@@ -19,8 +19,8 @@ namespace {
 
 // Where the parts of a joint diagnosis stand in the progress of the whole. Of 93 touches and 12 pictures with a hidden object_pose
 // the common search takes two thirds of the time.
-constexpr double kChecked = 0.03, kTouchesFitted = 0.08, kPicturesFitted = 0.2, kSharedFound = 0.8, kTouchesDiagnosed = 0.88,
-                 kPicturesDiagnosed = 0.97;
+constexpr double kChecked = 0.03, kTouchesFitted = 0.08, kPicturesFitted = 0.2, kSharedFound = 0.8,
+                 kTouchesDiagnosed = 0.88, kPicturesDiagnosed = 0.97;
 
 // A stretch of the progress of the whole.
 DiagnosisContext Stretch(const DiagnosisContext& context, double from, double to) {
@@ -49,7 +49,11 @@ class JointDiagnoser {
  public:
   // `gate` is what the context's progress goes through.
   JointDiagnoser(const DiagnosisInput& input, const DiagnosisContext& context, ProgressGate* gate)
-      : input_(input), context_(context), gate_(*gate), touches_(TouchesOf(input)), photographs_(PhotographsOf(input)) {
+      : input_(input),
+        context_(context),
+        gate_(*gate),
+        touches_(TouchesOf(input)),
+        photographs_(PhotographsOf(input)) {
     touches_.model = std::make_shared<const model::Model>(selection::TouchPartOf(*input.model));
   }
 
@@ -75,7 +79,8 @@ class JointDiagnoser {
     }
     if (!parts_.shared.conflicts.empty()) {
       // Each kind contradicts the other: how wrong and where, and nothing else.
-      TOUCHSTONE_ASSIGN_OR_RETURN(parts_.touches, CompareTouches(touches_, Stretch(context_, kSharedFound, kTouchesDiagnosed)));
+      TOUCHSTONE_ASSIGN_OR_RETURN(
+          parts_.touches, CompareTouches(touches_, Stretch(context_, kSharedFound, kTouchesDiagnosed)));
       TOUCHSTONE_RETURN_IF_ERROR(ComparePictures());
       return report::Join(std::move(parts_));
     }
@@ -128,9 +133,8 @@ class JointDiagnoser {
       };
       return part;
     };
-    TOUCHSTONE_ASSIGN_OR_RETURN(
-        const auto touches,
-        selection::TouchModality::Make(touches_, until_searching(kChecked, kTouchesFitted)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const auto touches, selection::TouchModality::Make(
+                                                        touches_, until_searching(kChecked, kTouchesFitted)));
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const auto photographs,
         images::PhotographModality::Make(photographs_, until_searching(kTouchesFitted, kPicturesFitted)));
@@ -149,8 +153,9 @@ class JointDiagnoser {
   }
 
   absl::Status ComparePictures() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(parts_.photographs,
-                                ComparePhotographSet(photographs_, Stretch(context_, kTouchesDiagnosed, kPicturesDiagnosed)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(
+        parts_.photographs,
+        ComparePhotographSet(photographs_, Stretch(context_, kTouchesDiagnosed, kPicturesDiagnosed)));
     return absl::OkStatus();
   }
 
@@ -159,14 +164,16 @@ class JointDiagnoser {
     touches.settled = parts_.shared.settled;
     touches.initial_model = touches_.model;
     touches.model = std::make_shared<const model::Model>(selection::TouchPartOf(parts_.shared.in_place));
-    TOUCHSTONE_ASSIGN_OR_RETURN(parts_.touches, DiagnoseTouches(touches, Stretch(context_, kSharedFound, kTouchesDiagnosed)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(parts_.touches,
+                                DiagnoseTouches(touches, Stretch(context_, kSharedFound, kTouchesDiagnosed)));
     DiagnosisInput photographs = photographs_;
     photographs.settled = parts_.shared.settled;
     photographs.model = std::make_shared<const model::Model>(parts_.shared.in_place);
     images::Expectation expectation;
     TOUCHSTONE_ASSIGN_OR_RETURN(
         images::PhotographDiagnosis pictures,
-        images::DiagnosePhotographs(photographs, Stretch(context_, kTouchesDiagnosed, kPicturesDiagnosed), &expectation));
+        images::DiagnosePhotographs(photographs, Stretch(context_, kTouchesDiagnosed, kPicturesDiagnosed),
+                                    &expectation));
     if (!parts_.shared.steps.empty()) {
       // Described is what the given model had left, before anything was put in place.
       if (expectation.after.empty()) expectation.after = std::move(expectation.before);
@@ -222,7 +229,8 @@ absl::StatusOr<report::Diagnosis> CompareJointSet(const DiagnosisInput& input,
                                                   const DiagnosisContext& context) {
   TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis photographs,
                               ComparePhotographSet(PhotographsOf(input), Stretch(context, 0, 0.5)));
-  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches, CompareTouches(TouchesOf(input), Stretch(context, 0.5, 1)));
+  TOUCHSTONE_ASSIGN_OR_RETURN(report::Diagnosis touches,
+                              CompareTouches(TouchesOf(input), Stretch(context, 0.5, 1)));
   return report::SideBySide(std::move(touches), std::move(photographs));
 }
 

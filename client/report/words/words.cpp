@@ -284,7 +284,8 @@ std::string WhatToTell(const v1::Report& report, const v1::Step& step) {
   std::vector<std::string> others(step.equivalent().begin(), step.equivalent().end());
   for (const v1::Ambiguity& ambiguity : report.ambiguities()) {
     const auto& effects = ambiguity.effects();
-    if (!step.equivalent().empty() || std::find(effects.begin(), effects.end(), step.effect()) == effects.end())
+    if (!step.equivalent().empty() ||
+        std::find(effects.begin(), effects.end(), step.effect()) == effects.end())
       continue;
     for (const std::string& effect : effects)
       if (effect != step.effect() && std::find(others.begin(), others.end(), effect) == others.end())

@@ -302,8 +302,10 @@ TEST(WhatToTell, NamesWhatTheDiscriminatingMeasurementPartsAStepFrom) {
 
 TEST(JointReport, TellsOfBothKinds) {
   v1::Report report = JointReport();
-  EXPECT_THAT(NoiseFloorSentences(report), HasSubstr(" Noise floor of the touches 5.00 ms (0.10 mm at 20 mm/s)"));
-  EXPECT_THAT(NoiseFloorSentences(report), HasSubstr(" Noise floor of the pictures 1.43 grey (levels of 255)"));
+  EXPECT_THAT(NoiseFloorSentences(report),
+              HasSubstr(" Noise floor of the touches 5.00 ms (0.10 mm at 20 mm/s)"));
+  EXPECT_THAT(NoiseFloorSentences(report),
+              HasSubstr(" Noise floor of the pictures 1.43 grey (levels of 255)"));
   EXPECT_THAT(TimesTheFloor(report, report.data(0)), HasSubstr("8.2 times the floor"));
   EXPECT_THAT(TimesTheFloor(report, report.data(1)), HasSubstr("4.2 times the floor"));
   EXPECT_EQ(Ladder(report, report.data(0)).size(), Ladder(report, report.data(1)).size());

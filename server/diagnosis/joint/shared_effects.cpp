@@ -270,9 +270,9 @@ class SharedFinder {
 
 }  // namespace
 
-absl::StatusOr<SharedEffects> FindSharedEffects(const std::vector<const engine::Modality*>& kinds,
-                                                const model::Model& given,
-                                                const std::function<bool(const std::string& stage, double done)>& progress) {
+absl::StatusOr<SharedEffects> FindSharedEffects(
+    const std::vector<const engine::Modality*>& kinds, const model::Model& given,
+    const std::function<bool(const std::string& stage, double done)>& progress) {
   return SharedFinder(kinds, given, progress).Run();
 }
 

@@ -62,8 +62,8 @@ struct SharedEffects {
 
 // `kinds`: at least two, each with enough data for a verdict of its own. `given`: the model with the effects of every kind.
 // `progress` is told what is tried and how much is done, 0 to 1, and answers false to cancel. Errors: CANCELLED, or what a simulator says.
-absl::StatusOr<SharedEffects> FindSharedEffects(const std::vector<const engine::Modality*>& kinds,
-                                                const model::Model& given,
-                                                const std::function<bool(const std::string& stage, double done)>& progress);
+absl::StatusOr<SharedEffects> FindSharedEffects(
+    const std::vector<const engine::Modality*>& kinds, const model::Model& given,
+    const std::function<bool(const std::string& stage, double done)>& progress);
 
 }  // namespace touchstone::diagnosis::joint

@@ -208,10 +208,12 @@ absl::StatusOr<SharedSelection> SearchShared(
       std::vector<SharedEffect> shared = selection.best.shared;
       shared.push_back(form.effect);
       // From what the best has; and, since what each kind shows by itself may have stood in for the effect, afresh.
-      const std::vector<OwnEffects> starts[] = {selection.best.own, own, std::vector<OwnEffects>(sides.size())};
+      const std::vector<OwnEffects> starts[] = {selection.best.own, own,
+                                                std::vector<OwnEffects>(sides.size())};
       std::optional<JointExplanation> with;
       for (size_t start = 0; start < std::size(starts); ++start) {
-        const double of_round = (static_cast<double>(tried.size()) + start / 3.0) / static_cast<double>(forms.size());
+        const double of_round =
+            (static_cast<double>(tried.size()) + start / 3.0) / static_cast<double>(forms.size());
         TOUCHSTONE_RETURN_IF_ERROR(enter(form.effect.name(), 1 - std::ldexp(2 - of_round, -round - 1)));
         TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh, ExplainWith(sides, shared, starts[start]));
         if (!with || afresh.fit.log_evidence > with->fit.log_evidence) with = std::move(afresh);
