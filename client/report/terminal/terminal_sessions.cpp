@@ -9,7 +9,6 @@
 #include "client/report/terminal/terminal_parts.h"
 #include "client/report/words/error_scale.h"
 #include "client/report/words/words.h"
-#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {
@@ -22,15 +21,15 @@ std::string ChangeInWords(const v1::ComparedValue& value, double p) {
   switch (value.change()) {
     case v1::ComparedEffect::CHANGED:
       return absl::StrCat("changed by ", value.difference() > 0 ? "+" : "",
-                          touchstone::ValueWithError(value.difference(), value.std_error()), " ",
-                          value.unit(), " (p ", Probability(p), ")");
+                          ValueWithError(value.difference(), value.std_error(), value.unit()), " (p ",
+                          Probability(p), ")");
     case v1::ComparedEffect::UNCHANGED:
-      return absl::StrCat("unchanged, within ",
-                          Number(std::max(std::abs(value.lower()), std::abs(value.upper())), 2), " ",
-                          value.unit());
+      return absl::StrCat(
+          "unchanged, within ",
+          SizeInUnit(std::max(std::abs(value.lower()), std::abs(value.upper())), value.unit()));
     default:
-      return value.std_error() > 0 ? absl::StrCat("cannot say: ", Number(value.lower(), 2), " to ",
-                                                  Number(value.upper(), 2), " ", value.unit())
+      return value.std_error() > 0 ? absl::StrCat("cannot say: ", SizeInUnit(value.lower(), value.unit()),
+                                                  " to ", SizeInUnit(value.upper(), value.unit()))
                                    : "cannot say";
   }
 }
@@ -50,7 +49,7 @@ const v1::SessionValue* OfSession(const v1::ComparedValue& value, int session) {
 std::string InSession(const v1::ComparedValue& value, int session) {
   const v1::SessionValue* one = OfSession(value, session);
   return one == nullptr ? "-"
-                        : absl::StrCat(touchstone::ValueWithError(one->value(), one->std_error()),
+                        : absl::StrCat(ValueWithError(one->value(), one->std_error(), value.unit()),
                                        one->outside() ? " !" : "");
 }
 
@@ -89,10 +88,10 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
              : value.change() == v1::ComparedEffect::UNCHANGED ? "Unchanged"
                                                                : "Cannot say");
   out->Paragraph(
-      absl::StrCat(NameOfValue(effect, value), ", ", value.unit(),
+      absl::StrCat(NameOfValue(effect, value),
                    value.between_sessions() > 0
-                       ? absl::StrCat(": scatters by ", Number(value.between_sessions(), 2), " ",
-                                      value.unit(), " between sessions, beyond its standard errors")
+                       ? absl::StrCat(": scatters by ", SizeInUnit(value.between_sessions(), value.unit()),
+                                      " between sessions, beyond its standard errors")
                        : ""));
   std::vector<std::vector<TextCell>> rows;
   for (const v1::SessionValue& one : value.sessions()) {
@@ -103,7 +102,7 @@ void AddChart(const v1::Report& report, const v1::ComparedEffect& effect, const 
     }
     chart[column(one.value())] = one.outside() ? 'X' : 'o';
     rows.push_back({{SessionLabel(report, static_cast<int>(one.session()))},
-                    {touchstone::ValueWithError(one.value(), one.std_error()), true},
+                    {ValueWithError(one.value(), one.std_error(), value.unit()), true},
                     {chart, false, one.outside() ? TextLayout::kBad : TextLayout::kBar},
                     {one.outside() ? "outside" : ""}});
   }

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "client/report/words/error_scale.h"
-#include "server/base/text/value_text.h"
 
 namespace touchstone::client {
 namespace {
@@ -60,16 +59,15 @@ JointTable ValuesOfBoth(const v1::Report& report) {
   const auto add = [&](const auto& message) {
     for (const v1::ParameterValue& p : message.parameters()) {
       if (p.alone().empty()) continue;
-      const std::string unit = p.unit().empty() ? "" : absl::StrCat(" ", p.unit());
       std::vector<std::string>& row = table.rows.emplace_back();
       row = {absl::StrCat(message.effect(), " ", p.name(), p.finger().empty() ? "" : " ", p.finger(),
                           p.object().empty() ? "" : " of ", p.object()),
-             absl::StrCat(touchstone::ValueWithError(p.value(), p.std_error()), unit)};
+             ValueWithError(p)};
       for (const v1::DataReport& data : report.data()) {
         const auto own = std::find_if(p.alone().begin(), p.alone().end(),
                                       [&](const v1::ErrorAlone& one) { return one.kind() == data.kind(); });
         row.push_back(own == p.alone().end() ? "says nothing"
-                                             : absl::StrCat("+- ", Number(own->std_error(), 2), unit));
+                                             : absl::StrCat("+- ", SizeInUnit(own->std_error(), p.unit())));
       }
     }
   };

@@ -96,30 +96,40 @@ std::string Covariate(const std::string& name, const std::string& unit) {
   return absl::StrCat(absl::StrReplaceAll(stem, {{"_", " "}}), " (", unit, ")");
 }
 
-std::string ValueWithError(const v1::ParameterValue& value) {
+namespace {
+
+// Of a value in the report's unit: what brings it into the unit for people, and that unit with its space; `size` of times decides.
+struct ShownUnit {
   double scale = 1;
-  std::string unit = value.unit();
-  if (unit == "us") {
-    const TimeUnit time = UnitOfTime(std::max(std::abs(value.value()), value.std_error()));
-    scale = time.per_us;
-    unit = time.symbol;
-  }
-  const std::string text = touchstone::ValueWithError(value.value() * scale, value.std_error() * scale);
-  return unit.empty() ? text : absl::StrCat(text, " ", unit);
+  std::string symbol;
+};
+ShownUnit UnitShown(double size, const std::string& unit) {
+  if (unit == "us") return {UnitOfTime(size).per_us, absl::StrCat(" ", UnitOfTime(size).symbol)};
+  return {1, unit.empty() ? "" : absl::StrCat(" ", unit)};
+}
+
+}  // namespace
+
+std::string SizeInUnit(double value, const std::string& unit, int digits) {
+  const ShownUnit shown = UnitShown(value, unit);
+  return absl::StrCat(Number(value * shown.scale, digits), shown.symbol);
+}
+
+std::string ValueWithError(double value, double std_error, const std::string& unit) {
+  const ShownUnit shown = UnitShown(std::max(std::abs(value), std_error), unit);
+  return absl::StrCat(touchstone::ValueWithError(value * shown.scale, std_error * shown.scale), shown.symbol);
+}
+
+std::string ValueWithError(const v1::ParameterValue& value) {
+  return ValueWithError(value.value(), value.std_error(), value.unit());
 }
 
 std::string Interval(const v1::ParameterValue& value) {
   if (!(value.lower() < value.upper())) return "";
-  double scale = 1;
-  std::string unit = value.unit();
-  if (unit == "us") {
-    const TimeUnit time = UnitOfTime(std::max(std::abs(value.lower()), std::abs(value.upper())));
-    scale = time.per_us;
-    unit = time.symbol;
-  }
-  const int decimals = DecimalsFor((value.upper() - value.lower()) * scale, 2);
-  return absl::StrCat(Fixed(value.lower() * scale, decimals), " to ", Fixed(value.upper() * scale, decimals),
-                      unit.empty() ? "" : " ", unit);
+  const ShownUnit shown = UnitShown(std::max(std::abs(value.lower()), std::abs(value.upper())), value.unit());
+  const int decimals = DecimalsFor((value.upper() - value.lower()) * shown.scale, 2);
+  return absl::StrCat(Fixed(value.lower() * shown.scale, decimals), " to ",
+                      Fixed(value.upper() * shown.scale, decimals), shown.symbol);
 }
 
 std::string ParameterName(const v1::ParameterValue& value) {

@@ -28,7 +28,10 @@ std::string EffectProbability(double p);                                  // "0.
 std::string Share(double share);                                          // "98.5 %"
 std::string Covariate(const std::string& name, const std::string& unit);  // "incidence (deg)"
 
+// "1.7 ms", "0.042 mm": `digits` significant digits. Times in the unit for people.
+std::string SizeInUnit(double value, const std::string& unit, int digits = 2);
 // "2.98 +- 0.02 mm": as many digits as the error allows. Times in the unit for people.
+std::string ValueWithError(double value, double std_error, const std::string& unit);
 std::string ValueWithError(const v1::ParameterValue& value);
 // "2.94 to 3.02 mm", or empty if the report has no interval.
 std::string Interval(const v1::ParameterValue& value);

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Value } from "./data/report";
-import { count, effectProbability, error, fixed, interval, join, number, probability, share, signedError, typeset, withError } from "./format";
+import { count, effectProbability, error, fixed, interval, join, number, probability, share, signedError, sized, typeset, withError } from "./format";
 import { casesOf } from "./testing/cases";
 
 const value = (fields: Partial<Value>): Value => ({ name: "radius_mm", value: 2.98, std_error: 0.02, unit: "mm", finger: "", object: "", lower: Number.NaN, upper: Number.NaN, alone: [], ...fields });
@@ -8,7 +8,7 @@ const value = (fields: Partial<Value>): Value => ({ name: "radius_mm", value: 2.
 const rules: Record<string, (unit: string, a: number, b: number) => string> = {
   time: (_, us) => error("TOUCHES", us), signed_time: (_, us) => signedError("TOUCHES", us), grey: (_, level) => error("PHOTOGRAPHS", level), px: (_, size) => error("BOARDS", size),
   probability: (_, p) => probability(p), effect_probability: (_, p) => effectProbability(p), share: (_, part) => share(part), count: (_, of) => count(of),
-  value: (unit, of, std_error) => withError(value({ value: of, std_error, unit })), interval: (unit, lower, upper) => interval(value({ lower, upper, unit })),
+  value: (unit, of, std_error) => withError(value({ value: of, std_error, unit })), size: (unit, of) => sized(of, unit), interval: (unit, lower, upper) => interval(value({ lower, upper, unit })),
 };
 const plain = (text: string) => text.replace(/[\u00a0\u2009]/g, " ");
 

@@ -1,7 +1,7 @@
 // Numbers as people read them: the digits of numbers.ts, and the rules of client/report/words/words.h (its cases, in
 // client/report/words/word_cases.txt, are read by the test of this file too), set in type.
 import type { DataReport, Kind, Value } from "./data/report";
-import { decimalsFor, fixedNumber, roundedNumber, valueWithError } from "./numbers";
+import { decimalsFor, fixedNumber, roundedNumber, roundNumber, valueWithError } from "./numbers";
 
 const minus = "\u2212";
 const thin = "\u2009";
@@ -15,10 +15,10 @@ export function number(value: number | null | undefined, digits = 3): string {
   return typeset(roundedNumber(value ?? Number.NaN, digits)).replace("infinite", "\u221e");
 }
 
-export function fixed(value: number, places: number): string { return typeset(fixedNumber(value, places)); }
+// A round number as it is: "20", "0.05".
+export function plain(value: number): string { return typeset(roundNumber(value)); }
 
-// A value with its standard error, of one unit: "2.98 \u00b1 0.02".
-export function plusMinus(value: number, stdError: number): string { return typeset(valueWithError(value, stdError)); }
+export function fixed(value: number, places: number): string { return typeset(fixedNumber(value, places)); }
 
 // Whole numbers of at least five digits in groups.
 export function count(value: number): string {
@@ -87,13 +87,14 @@ function scaled(size: number, unit: string): Unit {
 export const spaced = (symbol: string) => (symbol ? (symbol === "\u00b0" ? symbol : `\u00a0${symbol}`) : "");
 
 // "2.98 \u00b1 0.02 mm": as many digits as the error allows.
-export function withError(value: Value): string {
-  const { factor, symbol } = scaled(Math.max(Math.abs(value.value), value.std_error || 0), value.unit);
-  return `${plusMinus(value.value * factor, value.std_error * factor)}${spaced(symbol)}`;
+export function measured(value: number, stdError: number, unit: string): string {
+  const { factor, symbol } = scaled(Math.max(Math.abs(value), stdError || 0), unit);
+  return `${typeset(valueWithError(value * factor, stdError * factor))}${spaced(symbol)}`;
 }
+export const withError = (value: Value) => measured(value.value, value.std_error, value.unit);
 
 export function before(value: Value): string {
-  return value.before === undefined ? "" : withError({ ...value, value: value.before, std_error: 0 });
+  return value.before === undefined ? "" : measured(value.before, 0, value.unit);
 }
 
 export function hasInterval(value: Value): boolean {
@@ -132,6 +133,7 @@ export function join(words: string[], last: string): string {
 // ASCII of the sentences, set in type.
 export function typeset(text: string): string {
   return text
+    .replace(/built-in/g, "built\u2011in")
     .replace(/(^|[ ([])-(?=\d|infinite)/g, `$1${minus}`)
     .replace(/ ?\+- /g, "\u00a0\u00b1\u00a0")
     .replace(/<->/g, "\u2194")

@@ -18,6 +18,7 @@ constexpr int kMaxTried = 3;        // forms per round, beside those that a kind
 constexpr double kWorthTrying = 3;  // nats that one kind, or all together, expect of a form
 constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
 constexpr int kMaxShared = 6;       // effects
+constexpr double kWithout = 0.1;    // of the progress: the explanation without any shared effect
 
 engine::SearchRules Rules() {
   return {};
@@ -147,6 +148,39 @@ bool IsWorthIt(const Sides& sides, const JointExplanation& before, const JointEx
   return PredictsUnseen(sides, before, after);
 }
 
+// Is told which share is done, 0 to 1. Error: CANCELLED.
+using Enter = std::function<absl::Status(double done)>;
+
+// The shared effects, fitted jointly, with whatever each kind shows beside them.
+absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
+                                             std::vector<OwnEffects> own, const Enter& enter) {
+  const auto steps = static_cast<double>(1 + kPasses * sides.size());
+  int done = 0;
+  TOUCHSTONE_RETURN_IF_ERROR(enter(done++ / steps));
+  JointExplanation best{std::move(shared), std::move(own), {}};
+  TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
+  for (int pass = 0; pass < kPasses; ++pass) {
+    JointExplanation next = best;
+    for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
+    bool same = true;
+    for (const Side& side : sides) {
+      TOUCHSTONE_RETURN_IF_ERROR(enter(done++ / steps));
+      engine::Explanation explanation;
+      explanation.initial_effects = side.InitialEffects(next.shared);
+      explanation.fit.model = side.Held(next.shared, best.own[side.kind]);
+      TOUCHSTONE_ASSIGN_OR_RETURN(explanation, side.own_search->Continue(std::move(explanation)));
+      next.own[side.kind] = side.OwnOf(explanation.fit, explanation.initial_effects);
+      same &= next.own[side.kind].Key() == best.own[side.kind].Key();
+    }
+    if (same) break;
+    TOUCHSTONE_ASSIGN_OR_RETURN(next.fit, FitJointly(PartsOf(sides, next)));
+    if (next.fit.log_evidence <= best.fit.log_evidence) break;
+    best = std::move(next);
+  }
+  for (SharedEffect& effect : best.shared) effect = WithValues(effect, best.fit);
+  return best;
+}
+
 }  // namespace
 
 std::vector<std::string> OwnBeside(const JointExplanation& one, const JointExplanation& other) {
@@ -166,38 +200,14 @@ std::vector<Part> PartsOf(const Sides& sides, const JointExplanation& explained)
   return parts;
 }
 
-absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                             std::vector<OwnEffects> own) {
-  JointExplanation best{std::move(shared), std::move(own), {}};
-  TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
-  for (int pass = 0; pass < kPasses; ++pass) {
-    JointExplanation next = best;
-    for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
-    bool same = true;
-    for (const Side& side : sides) {
-      engine::Explanation explanation;
-      explanation.initial_effects = side.InitialEffects(next.shared);
-      explanation.fit.model = side.Held(next.shared, best.own[side.kind]);
-      TOUCHSTONE_ASSIGN_OR_RETURN(explanation, side.own_search->Continue(std::move(explanation)));
-      next.own[side.kind] = side.OwnOf(explanation.fit, explanation.initial_effects);
-      same &= next.own[side.kind].Key() == best.own[side.kind].Key();
-    }
-    if (same) break;
-    TOUCHSTONE_ASSIGN_OR_RETURN(next.fit, FitJointly(PartsOf(sides, next)));
-    if (next.fit.log_evidence <= best.fit.log_evidence) break;
-    best = std::move(next);
-  }
-  for (SharedEffect& effect : best.shared) effect = WithValues(effect, best.fit);
-  return best;
-}
-
 absl::StatusOr<SharedSelection> SearchShared(
     const Sides& sides, const std::function<absl::Status(const std::string& tried, double done)>& enter) {
-  TOUCHSTONE_RETURN_IF_ERROR(enter("", 0));
   std::vector<OwnEffects> own;
   for (const Side& side : sides) own.push_back(side.own_alone());
   SharedSelection selection;
-  TOUCHSTONE_ASSIGN_OR_RETURN(selection.none, ExplainWith(sides, {}, own));
+  TOUCHSTONE_ASSIGN_OR_RETURN(
+      selection.none, ExplainWith(sides, {}, own, [&](double done) { return enter("", kWithout * done); }));
+  TOUCHSTONE_RETURN_IF_ERROR(enter("", kWithout));
   selection.best = selection.none;
   for (int round = 0; round < kMaxShared; ++round) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Form> forms, ListForms(sides, selection.best));
@@ -212,10 +222,14 @@ absl::StatusOr<SharedSelection> SearchShared(
                                                 std::vector<OwnEffects>(sides.size())};
       std::optional<JointExplanation> with;
       for (size_t start = 0; start < std::size(starts); ++start) {
-        const double of_round =
-            (static_cast<double>(tried.size()) + start / 3.0) / static_cast<double>(forms.size());
-        TOUCHSTONE_RETURN_IF_ERROR(enter(form.effect.name(), 1 - std::ldexp(2 - of_round, -round - 1)));
-        TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh, ExplainWith(sides, shared, starts[start]));
+        const auto of_round = [&](double done) {
+          const double tries = static_cast<double>(start) + done,
+                       of_forms = static_cast<double>(tried.size()) + tries / std::size(starts);
+          const double share = 1 - std::ldexp(2 - of_forms / static_cast<double>(forms.size()), -round - 1);
+          return enter(form.effect.name(), kWithout + (1 - kWithout) * share);
+        };
+        TOUCHSTONE_ASSIGN_OR_RETURN(JointExplanation afresh,
+                                    ExplainWith(sides, shared, starts[start], of_round));
         if (!with || afresh.fit.log_evidence > with->fit.log_evidence) with = std::move(afresh);
       }
       tried.push_back(*std::move(with));

@@ -27,10 +27,6 @@ std::vector<std::string> OwnBeside(const JointExplanation& one, const JointExpla
 
 using Sides = std::vector<Side>;
 
-// The shared effects, fitted jointly, with whatever each kind shows beside them.
-absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
-                                             std::vector<OwnEffects> own);
-
 // `enter` is told which effect is tried and how much of the search is done, 0 to 1; its error ends the search. How many effects
 // will be found is not known: each that is found halves what is left.
 absl::StatusOr<SharedSelection> SearchShared(

@@ -62,19 +62,20 @@ const shortRows = 12; // printed on one page
 interface TableProps {
   title: string; columns: (Column | string)[]; rows: ComponentChildren[][]; csv?: () => Row[]; tone?: (row: number) => string | undefined;
   caption?: ComponentChildren;
+  stacked?: boolean; // on a phone every row is a block, its cells below one another
 }
 
-export function Table({ title, columns, rows, csv, tone, caption }: TableProps) {
+export function Table({ title, columns, rows, csv, tone, caption, stacked }: TableProps) {
   const heads = columns.map((column) => (typeof column === "string" ? { title: column } : column));
   return (
-    <figure class={rows.length > shortRows ? "table" : "table short"}>
+    <figure class={`table${rows.length > shortRows ? "" : " short"}${stacked ? " stacked" : ""}`}>
       {csv && <div class="plot-head"><div class="plot-title">{title}</div><Tools title={title} rows={csv} /></div>}
       <div class="scroll" tabIndex={0} role="region" aria-label={title}>
         <table>
           <thead><tr>{heads.map((head) => (head.title ? <th scope="col" class={head.number ? "num" : undefined}>{head.title}</th> : <td />))}</tr></thead>
           <tbody>
             {rows.map((row, i) => (
-              <tr class={tone?.(i)}>{row.map((cell, k) => <td class={heads[k]?.number ? "num" : undefined}>{cell}</td>)}</tr>
+              <tr class={tone?.(i)}>{row.map((cell, k) => <td class={heads[k]?.number ? "num" : undefined} data-title={stacked ? heads[k]?.title : undefined}>{cell}</td>)}</tr>
             ))}
           </tbody>
         </table>

@@ -45,7 +45,7 @@ const kinds: Record<string, [string, string]> = { TOUCHES: ["touches", "contact 
 const kindName = (data: DataReport) => kinds[data.kind]?.[0] ?? data.kind;
 
 // The rungs of all kinds, those of one name beside one another.
-export function joinedRungs(ladders: Rung[][]): { rung: Rung; of: (Rung | undefined)[] }[] {
+function joinedRungs(ladders: Rung[][]): { rung: Rung; of: (Rung | undefined)[] }[] {
   const order = ["given", "refit", "step", "suggestion", "floor"];
   const key = (rung: Rung) => (rung.kind === "floor" ? rung.kind : `${rung.kind} ${rung.name}`);
   const keys = [...new Map(ladders.flat().map((rung) => [key(rung), rung])).entries()].sort((a, b) => order.indexOf(a[1].kind) - order.indexOf(b[1].kind));

@@ -1,6 +1,6 @@
 // What to measure next, sets without poses, the data behind the report, how the numbers came about, how to make it again.
 import { Code, Section, Table, Terms } from "../parts/parts";
-import { count, error, fixed, isPictures, join, number, probability, readings, signedError, typeset, unitFor } from "../format";
+import { count, error, fixed, isPictures, join, number, plain, probability, readings, signedError, typeset, unitFor } from "../format";
 import { shownData, entry, page, selectTouch, touches } from "../state";
 import type { DataReport } from "../data/report";
 
@@ -18,7 +18,7 @@ export function Next() {
       {[...purposes].filter(([purpose]) => purpose).map(([purpose, verdict]) => <p><b>{typeset(purpose)}</b>{verdict && `: it takes ${typeset(verdict)}.`}</p>)}
       {list.length > 0 && <Table title="Next touches" columns={[{ title: "No.", number: true }, "Object", { title: "target x y z (mm)", number: true }, { title: "approach", number: true }, { title: "speed (mm/s)", number: true }, { title: "apart (sigmas)", number: true }, "What it is for"]}
         csv={() => [["no", "object", "target_x_mm", "target_y_mm", "target_z_mm", "approach_x", "approach_y", "approach_z", "speed_mm_s", "separation", "purpose"], ...list.map(({ one }, i) => { const t = one.touch!; return [i + 1, one.object, 1000 * t.target_m.x, 1000 * t.target_m.y, 1000 * t.target_m.z, t.approach.x, t.approach.y, t.approach.z, 1000 * t.speed_m_s, one.separation, one.purpose]; })]}
-        rows={list.map(({ one }, i) => [i + 1, one.object, place(one.touch!.target_m, 1000, 1), place(one.touch!.approach, 1, 2), number(1000 * one.touch!.speed_m_s), apart(one.separation), typeset(one.purpose)])}
+        rows={list.map(({ one }, i) => [i + 1, one.object, place(one.touch!.target_m, 1000, 1), place(one.touch!.approach, 1, 2), plain(1000 * one.touch!.speed_m_s), apart(one.separation), typeset(one.purpose)])}
         caption="Apart: the expected difference between the explanations, in standard deviations of the noise. The object above shows them as arrows." />}
       {pictures.length > 0 && <Table title="Next pictures" columns={[{ title: "No.", number: true }, "Object", { title: "eye x y z (mm)", number: true }, { title: "at x y z (mm)", number: true }, { title: "up", number: true }, { title: "apart (sigmas)", number: true }, "What it is for"]}
         csv={() => [["no", "object", "eye_x_mm", "eye_y_mm", "eye_z_mm", "at_x_mm", "at_y_mm", "at_z_mm", "separation", "purpose"], ...pictures.map(({ one }, i) => { const c = one.photograph!; return [i + 1, one.object, 1000 * c.eye_m.x, 1000 * c.eye_m.y, 1000 * c.eye_m.z, 1000 * c.at_m.x, 1000 * c.at_m.y, 1000 * c.at_m.z, one.separation, one.purpose]; })]}
@@ -73,7 +73,7 @@ function OneSet({ data, index }: { data: DataReport; index: number }) {
     <>
       <Terms terms={[
         ["Rows in the file", set && set.rows > 0 ? `${count(set.rows)}, of which ${count(data.count)} used` : ""], ["Objects", set ? set.objects.join(", ") : ""],
-        ["Speeds", set?.speeds_mm_s.length ? `${set.speeds_mm_s.map((speed) => number(speed)).join(", ")} mm/s` : ""],
+        ["Speeds", set?.speeds_mm_s.length ? `${set.speeds_mm_s.map(plain).join(", ")} mm/s` : ""],
         [isPictures(data.kind) ? "Noise floor per pixel" : "Noise floor per finger", floorWords(data, about.floor, about.floor_is_bound)], ["Mean residual of each finger", typeset(about.finger_bias)],
         ["Fingers that reported nothing", set?.missed_contacts ? count(set.missed_contacts) : ""], ["Outliers", aside?.outliers ? count(aside.outliers) : ""], ["Set aside", aside?.words ? typeset(aside.words) : ""],
         ["Needed for a verdict", data.needed ? `${count(data.needed)} ${readings(data)}` : ""],

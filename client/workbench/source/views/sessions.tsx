@@ -2,7 +2,7 @@
 import { Key, Section, Table } from "../parts/parts";
 import { type Mark, Plot } from "../charts/plot";
 import { rangeOf } from "../charts/scale";
-import { count, error, number, plusMinus, probability, spaced, typeset, unitSymbol } from "../format";
+import { count, error, measured, probability, sized, typeset, unitSymbol } from "../format";
 import { entry, page, session } from "../state";
 import type { ComparedEffect, ComparedValue, DataReport, Report, SessionValue } from "../data/report";
 
@@ -14,13 +14,12 @@ export function sessionLabel(data: DataReport[], place: number): string {
 }
 
 const valueName = (effect: ComparedEffect, value: ComparedValue) => `${value.name}${value.finger ? ` ${value.finger}` : ""}${effect.object ? ` of ${effect.object}` : ""}`;
-const withUnit = (text: string, unit: string) => `${text}${spaced(unitSymbol(unit))}`;
 const tones: Record<string, string> = { CHANGED: "bad", UNCHANGED: "faint", CANNOT_SAY: "" };
 
 function changeWords(effect: ComparedEffect, value: ComparedValue): string {
-  if (value.change === "CHANGED") return `changed by ${withUnit(plusMinus(value.difference, value.std_error), value.unit)} (p ${probability(effect.p)})`;
-  if (value.change === "UNCHANGED") return `unchanged, within ${withUnit(number(Math.max(Math.abs(value.lower), Math.abs(value.upper)), 2), value.unit)}`;
-  return value.std_error > 0 ? `cannot say: ${number(value.lower, 2)} to ${withUnit(number(value.upper, 2), value.unit)}` : "cannot say";
+  if (value.change === "CHANGED") return `changed by ${measured(value.difference, value.std_error, value.unit)} (p ${probability(effect.p)})`;
+  if (value.change === "UNCHANGED") return `unchanged, within ${sized(Math.max(Math.abs(value.lower), Math.abs(value.upper)), value.unit)}`;
+  return value.std_error > 0 ? `cannot say: ${sized(value.lower, value.unit)} to ${sized(value.upper, value.unit)}` : "cannot say";
 }
 
 // A point a session with two standard errors to either side; the limits are what the other sessions let expect.
@@ -28,7 +27,7 @@ function ControlChart({ report, effect, value }: { report: Report; effect: Compa
   const { sessions } = value;
   const limited = (one: SessionValue) => one.limit_upper > one.limit_lower;
   const label = (one: SessionValue) => sessionLabel(report.data, one.session);
-  const told = (one: SessionValue) => `${label(one)}: ${withUnit(plusMinus(one.value, one.std_error), value.unit)}${one.outside ? ", outside its limits" : ""}`;
+  const told = (one: SessionValue) => `${label(one)}: ${measured(one.value, one.std_error, value.unit)}${one.outside ? ", outside its limits" : ""}`;
   const range = rangeOf(sessions.flatMap((one) => [one.value - 2 * one.std_error, one.value + 2 * one.std_error, ...(limited(one) ? [one.limit_lower, one.limit_upper] : [])]), 0.14);
   const name = `${effect.effect} ${valueName(effect, value)}`;
   const outside = sessions.filter((one) => one.outside).map(label);
@@ -46,7 +45,7 @@ function ControlChart({ report, effect, value }: { report: Report; effect: Compa
         y={{ title: value.unit ? `value (${unitSymbol(value.unit)})` : "value", range }}
         rows={() => [["session", "value", "std_error", "limit_lower", "limit_upper", "outside"], ...sessions.map((one) => [report.data[one.session].session, one.value, one.std_error, one.limit_lower, one.limit_upper, one.outside ? 1 : 0])]}
         caption={<>{outside.length > 0 ? <b>Outside: {outside.join(", ")}.</b> : limits.length > 0 && "All within their limits."}{limits.length === 0 && "Limits take five sessions."}
-          {value.between_sessions > 0 && ` Scatters by ${withUnit(number(value.between_sessions, 2), value.unit)} between sessions, beyond its standard errors.`}</>} />
+          {value.between_sessions > 0 && ` Scatters by ${sized(value.between_sessions, value.unit)} between sessions, beyond its standard errors.`}</>} />
     </div>
   );
 }
@@ -59,7 +58,7 @@ export function Sessions() {
   const rows = compared.effects.flatMap((effect) => effect.values.map((value) => ({ effect, value })));
   const charted = rows.filter(({ value }) => value.sessions.length > 2);
   const of = (value: ComparedValue, place: number) => value.sessions.find((one) => one.session === place);
-  const shown = (value: ComparedValue, place: number) => { const one = of(value, place); return one ? plusMinus(one.value, one.std_error) : "\u2013"; };
+  const shown = (value: ComparedValue, place: number) => { const one = of(value, place); return one ? measured(one.value, one.std_error, value.unit) : "\u2013"; };
   const few = data.length <= 3;
   return (
     <Section id="sessions" title="Between the sessions" lead={typeset(compared.words)}>
@@ -76,7 +75,7 @@ export function Sessions() {
         csv={() => [["effect", "value", "object", "session", "estimate", "std_error", "change", "p"], ...rows.flatMap(({ effect, value }) => value.sessions.map((one) => [effect.effect, valueName(effect, value), effect.object, data[one.session].session, one.value, one.std_error, value.change, effect.p]))]} />}
       {charted.length > 0 && <>
         <h3>History</h3>
-        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--band)", text: "between its limits: what the other sessions let expect, three standard deviations" }]} /></p>
+        <p class="row"><Key keys={[{ colour: "var(--better)", text: "a session, two standard errors to either side" }, { colour: "var(--given)", text: "outside its limits" }, { colour: "var(--area)", text: "between its limits: what the other sessions let expect, three standard deviations" }]} /></p>
         <div class="charts">{charted.map(({ effect, value }) => <ControlChart report={report} effect={effect} value={value} />)}</div>
       </>}
     </Section>

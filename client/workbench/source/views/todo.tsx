@@ -1,6 +1,5 @@
 // What to do: mistakes of the file to fix, effects to add, values to change, the improved model.
-import { Bar, Code, IntervalPicture, Section, Table, Terms, ValueRows } from "../parts/parts";
-import { rankedCandidates, unseen } from "./why";
+import { Bar, Code, IntervalPicture, Section, Table, Terms } from "../parts/parts";
 import { before, effectProbability, error, interval, join, typeset, valueName, withError } from "../format";
 import { download } from "../charts/export";
 import { page, step } from "../state";
@@ -17,17 +16,6 @@ function Values({ values, title }: { values: Value[]; title: string }) {
   );
 }
 
-// What fits like a step, the most probable first.
-function Rivals({ one }: { one: Step }) {
-  const { report } = page.value!;
-  const alike = new Set([one.effect, ...one.equivalent]);
-  const seen = new Set<string>();
-  const rows = rankedCandidates(report.data).filter(({ one: { effect, rmse } }) => alike.has(effect) && rmse > 0 && !seen.has(effect) && seen.add(effect));
-  if (rows.length < 2) return null;
-  return <Table title={`What fits like ${one.effect}`} columns={["Fits alike", { title: "Probability", number: true }, { title: "It would leave", number: true }, "Value \u00b1 standard error, 95 % interval"]}
-    rows={rows.map(({ one: rival, data }) => [rival.effect, effectProbability(rival.probability), error(data.kind, unseen(rival)), <ValueRows values={rival.parameters} />])} />;
-}
-
 function StepBody({ one, place }: { one: Step; place: number }) {
   const alike = [one.effect, ...one.equivalent];
   const p = effectProbability(one.probability);
@@ -37,7 +25,6 @@ function StepBody({ one, place }: { one: Step; place: number }) {
       {one.words && <p>{typeset(one.words)}</p>}
       {one.equivalent.length > 0 && <p><strong>These data cannot tell {join(alike, "and")} apart.</strong></p>}
       <Values values={one.parameters} title={`Values of ${one.effect}`} />
-      {place === 0 && one.equivalent.length > 0 && <Rivals one={one} />}
       <Terms terms={[
         [page.value!.words.to_tell[place], typeset(one.discriminating_measurement)], ["To check on the rig", typeset(one.check_on_rig)], ["To fix it", typeset(one.remedy)],
         ["Scope", one.scope?.kind === "OBJECT" ? "one value per object" : ""],

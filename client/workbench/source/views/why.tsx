@@ -7,13 +7,13 @@ import { joint, shownData, page } from "../state";
 import { fingerColour } from "../colour";
 import type { Candidate, DataReport } from "../data/report";
 
-export const unseen = (one: { rmse: number; heldout_rmse: number }) => (one.heldout_rmse > 0 ? one.heldout_rmse : one.rmse);
+const unseen = (one: { rmse: number; heldout_rmse: number }) => (one.heldout_rmse > 0 ? one.heldout_rmse : one.rmse);
 
 const scopeWords = (one: Candidate) =>
   one.scope?.kind !== "OBJECT" ? "" : one.scope.objects.length === 1 ? `of ${one.scope.objects[0]} only` : "a value per object";
 
 // Of all kinds of data, the most probable first.
-export function rankedCandidates(data: DataReport[]): { one: Candidate; data: DataReport }[] {
+function rankedCandidates(data: DataReport[]): { one: Candidate; data: DataReport }[] {
   return data.flatMap((of) => of.candidates.map((one) => ({ one, data: of }))).sort((a, b) => b.one.probability - a.one.probability);
 }
 
@@ -31,7 +31,7 @@ function Candidates() {
   for (const { one } of ranked) if (!(one.rmse > 0) && one.note) notes.set(one.note, [...(notes.get(one.note) ?? []), one.effect + (one.scope?.kind === "OBJECT" ? " (per object)" : "")]);
   return (
     <>
-      {fitted.length > 0 && <Table title="Effects, ranked" tone={(row) => (faint(fitted[row].one) ? "faint" : undefined)}
+      {fitted.length > 0 && <Table stacked title="Effects, ranked" tone={(row) => (faint(fitted[row].one) ? "faint" : undefined)}
         columns={["Effect", { title: "Probability", number: true }, { title: "It would leave", number: true }, "", "Value \u00b1 standard error, 95 % interval"]}
         csv={() => [["effect", "scope", "probability", "rmse", "heldout_rmse", "unit", "note"], ...ranked.map(({ one, data }) => [one.effect, scopeWords(one), one.probability, one.rmse, one.heldout_rmse, data.unit, one.note])]}
         rows={fitted.map(({ one, data }) => {
