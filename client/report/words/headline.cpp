@@ -65,6 +65,19 @@ std::string FoundInRepeats(const v1::DistributionComparison& comparison) {
   return absl::StrCat("The model lacks something that shows without poses: ", Join(found, "and"), ".");
 }
 
+// "The model is off by 11.1 ms on touches (4.0 times the noise floor) and 6.03 grey on pictures (4.2 times the noise floor)."
+std::string ComparedByKind(const v1::Report& report) {
+  std::vector<std::string> errors;
+  for (const v1::DataReport& data : report.data()) {
+    const ErrorScale scale(data);
+    const double floor = NoiseFloorOf(data).sigma, rmse = data.initial().rmse();
+    errors.push_back(absl::StrCat(
+        scale.Text(rmse), " on ", scale.readings(),
+        floor > 0 ? absl::StrCat(" (", Number(rmse / floor, 2), " times the noise floor)") : ""));
+  }
+  return absl::StrCat("The model is off by ", Join(errors, "and"), ".");
+}
+
 std::string Compared(const v1::Report& report) {
   const v1::DataReport& data = MainData(report);
   if (data.has_distributions()) {
@@ -77,6 +90,7 @@ std::string Compared(const v1::Report& report) {
                         p < 0.01 ? "differ as distributions" : "cannot be told apart as distributions",
                         " (p ", p < 1e-15 ? "" : "= ", Probability(p), ").");
   }
+  if (IsJoint(report)) return ComparedByKind(report);
   const ErrorScale scale(data);
   const double rmse = data.initial().rmse();
   if (AgreesToRounding(data)) return "The model agrees with the data to the rounding of files and meshes.";

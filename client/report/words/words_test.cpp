@@ -313,6 +313,10 @@ TEST(JointReport, TellsOfBothKinds) {
   report.clear_steps();
   report.set_verdict(v1::Report::ADEQUATE);
   EXPECT_THAT(Headline(report), HasSubstr("as good as 960 touches and 12 pictures can tell"));
+  report.clear_verdict();
+  EXPECT_THAT(
+      Headline(report),
+      HasSubstr("off by 41.0 ms on touches (8.2 times the noise floor) and 6.03 grey on pictures (4.2"));
 }
 
 }  // namespace

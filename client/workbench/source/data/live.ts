@@ -11,7 +11,8 @@ import { followHash, page, session } from "../state";
 export interface Parameter { name: string; unit: string; lower: number; upper: number; typical: number; neutral: number; meaning: string; values: number[] }
 export interface ModelEffect { name: string; per_object: boolean; editable: boolean; parameters: Parameter[] }
 export interface Model { yaml: string; hash: string; name: string; effects: ModelEffect[] }
-export interface Rung { name: string; model: Model; rmse: number }
+// `errors`: of every kind of data, in the order of the report; `rmse` is that which the page is about.
+export interface Rung { name: string; model: Model; rmse: number; errors: number[] }
 
 export const live = signal(false);
 export const place = signal<{ evidence: boolean; origin: string; source: string; rig: string; stop_port: number } | null>(null);
@@ -97,21 +98,22 @@ async function askOnce(method: string, yaml: string, signal: AbortSignal): Promi
   return report;
 }
 
-// The RMSE of the given model in a serialized Report: data[entry].initial.rmse.
-function errorIn(report: Uint8Array, entry: number): number {
+// The RMSE of the given model in every entry of a serialized Report: data[].initial.rmse.
+function errorsIn(report: Uint8Array): number[] {
   const inside = (message: Uint8Array, wanted: number) => [...fieldsOf(message)].filter(({ number }) => number === wanted).map(({ bytes }) => bytes);
-  const data = inside(report, 10)[entry];
-  const quality = data && inside(data, 10)[0];
-  const rmse = quality && inside(quality, 1)[0];
-  return rmse ? double(rmse) : quality ? 0 : Number.NaN;
+  return inside(report, 10).map((data) => {
+    const quality = inside(data, 10)[0];
+    const rmse = quality && inside(quality, 1)[0];
+    return rmse ? double(rmse) : quality ? 0 : Number.NaN;
+  });
 }
 
 // The report of the last rung: its error at once, the views once the browser has painted it and no slider has moved for `restMs`:
 // to draw them takes longer than to compare, and a slider that moves on would wait for it.
 async function show(report: Uint8Array, signal: AbortSignal, restMs = 0): Promise<Report | null> {
   const setError = (entry: number) => {
-    const rmse = errorIn(report, entry);
-    rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse } : rung));
+    const errors = errorsIn(report);
+    rungs.value = rungs.value.map((rung, i) => (i === rungs.value.length - 1 ? { ...rung, rmse: errors[entry] ?? Number.NaN, errors } : rung));
   };
   setError(page.value?.words.main ?? 0);
   if (moved.value) return null; // a slider's next value waits already
@@ -153,11 +155,12 @@ async function change(of: Record<string, unknown>): Promise<Model> {
 const compareLast = async (signal: AbortSignal, restMs = 0) => { await show(await ask("Compare", model.value!.yaml, signal), signal, restMs); };
 
 // What a reload of the page needs: where the measurements came from, and the model with its steps.
-interface Kept { token: string; path: string; saved: string; rungs: { name: string; yaml: string; rmse: number | null }[] }
+interface Kept { token: string; path: string; saved: string; rungs: { name: string; yaml: string; rmse: number | null; errors: (number | null)[] }[] }
+const known = (of: number) => (Number.isFinite(of) ? of : null);
 let opened = "";
 function keepWork(): void {
   if (!opened || !rungs.value.length) return;
-  const kept: Kept = { token, path: opened, saved, rungs: rungs.value.map(({ name, model: { yaml }, rmse }) => ({ name, yaml, rmse: Number.isFinite(rmse) ? rmse : null })) };
+  const kept: Kept = { token, path: opened, saved, rungs: rungs.value.map(({ name, model: { yaml }, rmse, errors }) => ({ name, yaml, rmse: known(rmse), errors: errors.map(known) })) };
   try { sessionStorage.setItem("work", JSON.stringify(kept)); } catch { /* too large: a reload begins anew */ }
 }
 function keptWork(): Kept | null {
@@ -170,7 +173,7 @@ async function reopen({ path, saved: before, rungs: steps }: Kept): Promise<void
     const models = await Promise.all(steps.map(({ yaml }) => change({ yaml, change: "none" })));
     signal.throwIfAborted();
     saved = before;
-    rungs.value = steps.map(({ name, rmse }, i) => ({ name, model: models[i], rmse: rmse ?? Number.NaN }));
+    rungs.value = steps.map(({ name, rmse, errors }, i) => ({ name, model: models[i], rmse: rmse ?? Number.NaN, errors: (errors ?? []).map((one) => one ?? Number.NaN) }));
     await compareLast(signal);
   });
 }
@@ -198,7 +201,7 @@ async function open(path: string, what: string, keep = false): Promise<void> {
     // The model of the page stays where there is one: other measurements, the same question.
     const given = keep && model.value ? model.value : await change({ yaml, change: "none" });
     if (!keep) saved = given.yaml;
-    rungs.value = [{ name: given.name, model: given, rmse: Number.NaN }];
+    rungs.value = [{ name: given.name, model: given, rmse: Number.NaN, errors: [] }];
     diagnosis.value = null;
     await compareLast(signal);
   });
@@ -228,7 +231,7 @@ export function take(effect: string, sign: string): Promise<void> {
   return doing(`${sign} ${effect}`, async (signal) => {
     const next = await change(asked);
     signal.throwIfAborted();
-    rungs.value = [...before, { name: `${sign} ${effect}`, model: next, rmse: Number.NaN }];
+    rungs.value = [...before, { name: `${sign} ${effect}`, model: next, rmse: Number.NaN, errors: [] }];
     stale.value = true;
     await compareLast(signal);
   });
@@ -247,7 +250,7 @@ export async function addFormula(name: string, adds: string, expression: string,
     ...parameters.flatMap((one) => [`${one.name}=${one.value}`, ...(one.unit ? [`${one.name}_unit=${one.unit}`] : []), `${one.name}_min=${one.min}`, `${one.name}_max=${one.max}`])];
   let next: Model;
   try { next = await change({ yaml: model.value!.yaml, change: "formula", assignments }); } catch (reason) { return (reason as Error).message; }
-  rungs.value = [...rungs.value, { name: `+ ${name}`, model: next, rmse: Number.NaN }];
+  rungs.value = [...rungs.value, { name: `+ ${name}`, model: next, rmse: Number.NaN, errors: [] }];
   stale.value = true;
   void doing(`+ ${name}`, compareLast);
   return "";
@@ -275,7 +278,7 @@ async function takeValue(move: Move, signal: AbortSignal): Promise<void> {
   signal.throwIfAborted();
   const last = rungs.value[rungs.value.length - 1];
   const again = last.name === byHand;
-  rungs.value = [...(again ? rungs.value.slice(0, -1) : rungs.value), { name: byHand, model: next, rmse: again ? last.rmse : Number.NaN }];
+  rungs.value = [...(again ? rungs.value.slice(0, -1) : rungs.value), { name: byHand, model: next, rmse: again ? last.rmse : Number.NaN, errors: again ? last.errors : [] }];
   if (moved.value === move) moved.value = null;
 }
 

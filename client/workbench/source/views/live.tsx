@@ -1,8 +1,8 @@
 // The live workbench, above the report: what is missing, the model as it grows, and the error as it falls.
 import { useRef } from "preact/hooks";
 import { Bar, ValueRows } from "../parts/parts";
-import { effectProbability, error, number, share, spaced, typeset, unitSymbol } from "../format";
-import { page } from "../state";
+import { effectProbability, error, plain, readings, share, spaced, typeset, unitSymbol } from "../format";
+import { joint, page } from "../state";
 import { Formula } from "./formula";
 import { type Lost, type ModelEffect, byHand, cancel, diagnose, diagnosis, failure, model, moved, openExample, origin, place, rungs, save, setValue, stale, take, undo, working } from "../data/live";
 
@@ -37,7 +37,42 @@ function Status() {
   );
 }
 
+const change = (given: number, now: number) => (given > 0 && Number.isFinite(now) ? `${now > given ? "+" : "\u2212"}${share(Math.abs(now / given - 1))}` : "");
+
+// Of touches and pictures together: a column for each kind, in its unit and on its own scale.
+function JointLadder() {
+  const { report, words } = page.value!;
+  const kinds = report.data.map((data, k) => {
+    const floor = words.of_data[k].floor;
+    return { data, floor, given: rungs.value[0].errors[k], largest: Math.max(...rungs.value.map((rung) => rung.errors[k] || 0), floor) || 1 };
+  });
+  const last = rungs.value.length - 1;
+  return (
+    <>
+      <ol class="ladder" aria-label="The error after each change">
+        {rungs.value.map((rung, i) => (
+          <li class={`rung joint-rung live-rung${i === last && stale.value ? " stale" : ""}`} data-rmse={rung.rmse}>
+            <span class="rung-name">{rung.name || "given model"}</span>
+            {kinds.map(({ data, floor, given, largest }, k) => {
+              const rmse = rung.errors[k];
+              return (
+                <span class="joint-cell">
+                  <Bar share={(rmse || 0) / largest} tone={i ? "better" : "given"} mark={floor / largest} />
+                  <span class="rung-error">{Number.isFinite(rmse) ? error(data.kind, rmse) : "\u2026"}</span>
+                  <small class="joint-note">{readings(data)}{i > 0 && change(given, rmse) && `: ${change(given, rmse)}`}</small>
+                </span>
+              );
+            })}
+          </li>
+        ))}
+      </ol>
+      <p class="note">Bar: RMSE of the residuals of each kind of data. Dashed: its noise floor, {kinds.map(({ data, floor }) => error(data.kind, floor)).join(" and ")}; no model gets far below it.</p>
+    </>
+  );
+}
+
 function LiveLadder() {
+  if (joint.value) return <JointLadder />;
   const shown = page.value;
   const main = shown?.report.data[shown.words.main ?? 0];
   const kind = main?.kind ?? "TOUCHES";
@@ -53,7 +88,7 @@ function LiveLadder() {
             <span class="rung-name">{rung.name || "given model"}</span>
             <span class="rung-bar"><Bar share={(rung.rmse || 0) / largest} tone={i ? "better" : "given"} mark={floor / largest} /></span>
             <span class="rung-error">{Number.isFinite(rung.rmse) ? error(kind, rung.rmse) : "\u2026"}</span>
-            <span class="rung-change">{i > 0 && given > 0 && Number.isFinite(rung.rmse) && `${rung.rmse > given ? "+" : "\u2212"}${share(Math.abs(rung.rmse / given - 1))}`}</span>
+            <span class="rung-change">{i > 0 && change(given, rung.rmse)}</span>
           </li>
         ))}
       </ol>
@@ -121,7 +156,7 @@ function Slider({ effect, parameter, entry }: { effect: ModelEffect; parameter: 
     <label class="slider" title={one.meaning}>
       <span>{effect.name} <span class="soft">{one.name}{one.values.length > 1 ? ` ${entry + 1}` : ""}</span></span>
       <input type="range" min={low} max={high} step={niceStep(high - low)} value={value} onInput={(event) => setValue({ effect, parameter, entry, value: Number(Number(event.currentTarget.value).toPrecision(6)) })} />
-      <output>{number(value, 4)}{spaced(unitSymbol(one.unit))}</output>
+      <output>{plain(Number(value.toPrecision(4)))}{spaced(unitSymbol(one.unit))}</output>
     </label>
   );
 }
