@@ -24,7 +24,7 @@ function touchstone(...args) {
   assert.equal(status, 0, stderr);
 }
 
-// 120 touches and 12 photographs of two objects; the tool is turned, which no photograph shows.
+// 120 touches and 12 photographs of one of the two objects; the tool is turned, which no photograph shows.
 function writeSet() {
   const set = join(folder, "both");
   mkdirSync(set);
@@ -34,12 +34,13 @@ function writeSet() {
   touchstone("model", "add", "given.yaml", "tool_yaw", "angle_deg=2", "-o", "real.yaml");
   touchstone("plan", "lat20", "lat10", "-o", "plan.csv");
   touchstone("touch", "--plan", "plan.csv", "--model", "real.yaml", "--repeats", "6", "-o", join(set, "touches.csv"));
-  const eyes = [0, 60, 120, 180, 240, 300].map((deg) => [400 * Math.cos((deg * Math.PI) / 180), 400 * Math.sin((deg * Math.PI) / 180), 150].map((x) => x.toFixed(3)));
-  const rows = ["lat20", "lat10"].flatMap((object) => eyes.map((eye) => [object, ...eye, 0, 0, 0, 0, 0, 1].join(",")));
+  const degrees = [0, 60, 120, 180, 240, 300];
+  const eyes = [150, 300].flatMap((height) => degrees.map((deg) => [400 * Math.cos((deg * Math.PI) / 180), 400 * Math.sin((deg * Math.PI) / 180), height].map((x) => x.toFixed(3))));
+  const rows = eyes.map((eye) => ["lat20", ...eye, 0, 0, 0, 0, 0, 1].join(","));
   writeFileSync(join(set, "images.csv"), `image,file,object,eye_x_mm,eye_y_mm,eye_z_mm,at_x_mm,at_y_mm,at_z_mm,up_x,up_y,up_z\n${rows.map((row, i) => `${i},p-${String(i).padStart(4, "0")}.png,${row}`).join("\n")}\n`);
   const size = 64, focal = size / 2 / Math.tan(Math.PI / 8);
   writeFileSync(join(set, "camera.yaml"), `{width_px: ${size}, height_px: ${size}, fx_px: ${focal}, fy_px: ${focal}, cx_px: ${size / 2}, cy_px: ${size / 2}}\n`);
-  touchstone("capture", "--plan", join(set, "images.csv"), "--image", `${size}x${size}`, "--model", "real.yaml", "--renderer", "cpu", "-o", join(set, "p.png"));
+  touchstone("capture", "lat20", "--plan", join(set, "images.csv"), "--image", `${size}x${size}`, "--model", "real.yaml", "--renderer", "cpu", "-o", join(set, "p.png"));
 }
 
 test("a diagnosis of touches and photographs says how far it is, and both errors stand on the ladder", async () => {
