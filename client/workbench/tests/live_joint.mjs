@@ -47,7 +47,7 @@ test("a diagnosis of touches and photographs says how far it is, and both errors
   writeSet();
   await served(browser, folder, ["both", "--model", "given.yaml"], { colorScheme: "light" }, async (page) => {
     await ready(page, 1);
-    assert.match(await page.locator("h1").innerText(), /off by .* ms on touches .* and .* grey on pictures/);
+    assert.match(await page.locator("h1").innerText(), /off by .*\sms on touches .* and .*\sgrey on pictures/);
     // Every value that the bar has while it works.
     await page.evaluate(() => {
       window.told = [];
