@@ -147,6 +147,10 @@ std::vector<int> LeftOutFor(const Observations& observations, const std::string&
   return found == observations.unused.end() ? std::vector<int>() : found->second;
 }
 
+const char* NameOfTime(const Observations& o) {
+  return o.set->has_session_time ? "session_time_s" : "touch";
+}
+
 double PauseS(const Observations& o, int k) {
   if (!o.set->has_session_time || o.previous[k] < 0) return 0;
   return o.set->session_time_s[o.row[k]] - o.set->session_time_s[o.row[o.previous[k]]];

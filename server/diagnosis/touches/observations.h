@@ -34,6 +34,9 @@ struct Observations {
 // Checks that set, model and surfaces belong together. Errors name what is missing.
 absl::StatusOr<Observations> MakeObservations(const DiagnosisInput& input);
 
+// The covariate of a touch's place in the session: "session_time_s", or "touch" without session times.
+const char* NameOfTime(const Observations& observations);
+
 // Time since the session's previous touch; 0 for the first and without session times.
 double PauseS(const Observations& observations, int k);
 

@@ -169,6 +169,17 @@ double ProbabilityOfShare(double log_share) {
   return std::min(kMaxProbability, std::exp(log_share));
 }
 
+void PutFirst(CovariateTest test, UnexplainedRest* rest) {
+  std::vector<CovariateTest>& tests = rest->covariates;
+  const auto same = std::find_if(tests.begin(), tests.end(),
+                                 [&](const CovariateTest& other) { return other.name == test.name; });
+  if (same != tests.end()) {
+    test = *same;
+    tests.erase(same);
+  }
+  tests.insert(tests.begin(), std::move(test));
+}
+
 double ProbabilityAmong(const std::vector<double>& same, const std::vector<double>& all) {
   return ProbabilityOfShare(LogSum(same) - LogSum(all));
 }

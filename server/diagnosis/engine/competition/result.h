@@ -123,6 +123,9 @@ struct UnexplainedRest {
   double nearest_formula_share = 0;  // of the curve's gain, 0 to 1
 };
 
+// In front of the others; in the place of one of the same name, whose figures it keeps.
+void PutFirst(CovariateTest test, UnexplainedRest* rest);
+
 // In the order of v1::DataProblem::Kind.
 enum class ProblemKind {
   kFingerOrder,

@@ -30,7 +30,7 @@ std::vector<std::string> Names(const UnexplainedRest& rest) {
 }
 
 Hypotheses::Describe InFront(const std::string& name) {
-  return [name](UnexplainedRest* rest) { rest->covariates.insert(rest->covariates.begin(), {name, 0, 0}); };
+  return [name](UnexplainedRest* rest) { PutFirst({name, 0, 0}, rest); };
 }
 
 // Which of four are asked where these are found when they are asked.

@@ -47,7 +47,8 @@ class Climber {
                               *workspace_.input.model, o.objects, &ladder_));
     TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.prediction, workspace_.predictor->Run(ladder_.improved, true, true));
     ladder_.residuals = touches::Residuals(o, ladder_.prediction);
-    std::vector<double> best = ladder_.residuals;
+    std::vector<double>& best = climb_.residuals_with_rest;
+    best = ladder_.residuals;
     if (has_formula()) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Fit whole, FitAll(workspace_, selection_.fit));
       climb_.with_formula = whole.model.base();

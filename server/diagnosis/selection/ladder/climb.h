@@ -13,7 +13,9 @@ struct Climb {
   engine::Fit fit;                        // the same on all touches
   std::vector<engine::SelectedStep> steps;  // by the effects' indices in these fits
   std::optional<model::Model> with_formula;
-  engine::Quality before;  // of the model as it was given
+  std::vector<double>
+      residuals_with_rest;  // [k * fingers + i] of that; without a formula of the improved model
+  engine::Quality before;   // of the model as it was given
   // Improved model, steps with errors, refits, residuals, noise floor, dropouts.
   Ladder ladder;
   int without_gain = -1;  // engine::StepOrder's, by its index in these fits

@@ -21,8 +21,10 @@
 #include "server/diagnosis/selection/ladder/surface_step.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/scatter/touches_set_aside.h"
+#include "server/diagnosis/selection/session/moving_object.h"
 #include "server/diagnosis/selection/session/round_structure.h"
 #include "server/diagnosis/selection/session/time_structure.h"
+#include "server/diagnosis/selection/session/turns.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 #include "server/effects/all_effects.h"
@@ -106,7 +108,7 @@ class LadderBuilder {
         {H::kGroup, ask([this] {
            if (selection_.group)
              found_.Add(H::kGroup, selection_.group->words, [this](engine::UnexplainedRest* rest) {
-               rest->covariates.insert(rest->covariates.begin(), selection_.group->test);
+               engine::PutFirst(selection_.group->test, rest);
              });
          })},
         {H::kPartialOffset, ask([this] {
@@ -117,8 +119,11 @@ class LadderBuilder {
            if (selection_.curve) found_.Add(H::kCurve, CourseInWords(selection_.curve->words));
          })},
         {H::kStrangeValues, ask([this] { AskStrangeValues(); })},
+        {H::kTurns, ask([this] { AskTurns(); })},
+        {H::kMovingObject, ask([this] { AskMovingObject(); })},
         {H::kRemounted, ask([this] { AskRounds(); })},
         {H::kTicks, ask([this] { AskTicks(); })},
+        {H::kFingerTicks, ask([this] { noise_.AskFingerTicks(); })},
         {H::kSetAside, ask([this] { AskSetAside(); })},
         {H::kUnplaced, [this] { return AskSurface(); }},
         {H::kPlay, ask([this] { noise_.AskPlay(); })},
@@ -151,6 +156,22 @@ class LadderBuilder {
     DoubtTwoSpeeds(workspace_, *climb_.searched, climb_.steps, &ladder_);
     std::string strange = StrangeValuesInWords(climb_.fit, climb_.steps, &ladder_);
     if (!strange.empty()) found_.Add(H::kStrangeValues, std::move(strange));
+  }
+
+  void AskTurns() {
+    const std::optional<Turns> turns = FindTurns(observations_, climb_.residuals_with_rest);
+    if (!turns) return;
+    found_.Add(H::kTurns, turns->words,
+               [turns = *turns](engine::UnexplainedRest* rest) { NameTurnFirst(turns, rest); });
+  }
+
+  void AskMovingObject() {
+    const std::optional<MovingObject> moving =
+        FindMovingObject(observations_, ladder_.prediction, climb_.residuals_with_rest);
+    if (!moving) return;
+    found_.Add(H::kMovingObject, moving->words, [this, moving = *moving](engine::UnexplainedRest* rest) {
+      NameMotionFirst(observations_, moving, rest);
+    });
   }
 
   void AskRounds() {
@@ -243,7 +264,7 @@ class LadderBuilder {
   engine::Hypotheses found_{HypothesisRules()};
   engine::Quality left_;  // on the touches that the fits used: what the verdict is about
   RoundStructure rounds_;
-  NoiseQuestions noise_{observations_, selection_, &found_, &ladder_};
+  NoiseQuestions noise_{observations_, selection_, climb_.residuals_with_rest, &found_, &ladder_};
 };
 
 }  // namespace

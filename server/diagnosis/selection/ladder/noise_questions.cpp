@@ -1,13 +1,18 @@
 #include "server/diagnosis/selection/ladder/noise_questions.h"
 
+#include <absl/strings/str_format.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
 
+#include "server/base/text/readable_time.h"
 #include "server/diagnosis/selection/scatter/lopsided_scatter.h"
 #include "server/diagnosis/selection/scatter/uneven_scatter.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
+#include "server/diagnosis/touches/noise/ticks.h"
 #include "server/effects/all_effects.h"
+#include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -25,15 +30,30 @@ void DoubtStep(const std::string& words, engine::LadderStep* step) {
 }  // namespace
 
 NoiseQuestions::NoiseQuestions(const touches::Observations& observations, const SelectionResult& selection,
-                               engine::Hypotheses* found, Ladder* ladder)
+                               const std::vector<double>& residuals_with_rest, engine::Hypotheses* found,
+                               Ladder* ladder)
     : observations_(observations),
       selection_(selection),
+      residuals_with_rest_(residuals_with_rest),
       found_(found),
       ladder_(ladder),
       noise_(selection.noise) {}
 
+// A finger whose column was rounded, or whose contact is polled, scatters more than the others for that reason.
+void NoiseQuestions::AskFingerTicks() {
+  if (selection_.noise.poll_interval_s.gain_nats > 0) return;
+  const touches::FingerTicks ticks = touches::FindFingerTicks(observations_);
+  if (ticks.interval_s == 0) return;
+  found_->Add(
+      Hypothesis::kFingerTicks,
+      absl::StrFormat("Every time of finger %s is a multiple of %s, the others' times are not: its contact "
+                      "is polled, or its column was rounded. Read it as the others are read.",
+                      model::FingerName(ticks.finger, observations_.fingers), TimeInWords(ticks.interval_s)));
+}
+
+// Repeats differ by what depends on time or on the touch before, which is no play.
 void NoiseQuestions::AskPlay() {
-  pose_scatter_ = FindPoseScatter(observations_, ladder_->prediction, ladder_->residuals, selection_.noise);
+  pose_scatter_ = FindPoseScatter(observations_, ladder_->prediction, residuals_with_rest_, selection_.noise);
   if (pose_scatter_ && pose_scatter_->ahead) found_->Add(Hypothesis::kPlay, pose_scatter_->words);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "server/diagnosis/selection/ladder/hypotheses.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
@@ -12,11 +13,12 @@ namespace touchstone::diagnosis::selection {
 
 class NoiseQuestions {
  public:
-  // All must outlive it.
+  // `residuals_with_rest`: Climb's. All must outlive it.
   NoiseQuestions(const touches::Observations& observations, const SelectionResult& selection,
-                 engine::Hypotheses* found, Ladder* ladder);
+                 const std::vector<double>& residuals_with_rest, engine::Hypotheses* found, Ladder* ladder);
 
   // By the hypotheses of their names.
+  void AskFingerTicks();
   void AskPlay();
   void AskUnevenScatter();
   void AskRandomDelay();
@@ -31,6 +33,7 @@ class NoiseQuestions {
 
   const touches::Observations& observations_;
   const SelectionResult& selection_;
+  const std::vector<double>& residuals_with_rest_;
   engine::Hypotheses* found_;
   Ladder* ladder_;
   touches::NoiseFindings noise_;  // the selection's, without what other hypotheses explain

@@ -175,7 +175,9 @@ namespace {
 
 // The noise of one reading. Where repeats say how much they scatter, what a misfit adds to the residuals is no noise,
 // and neither is a course in time that repeats share.
-touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine::NoiseFloor& floor) {
+// `in_time`: kinds of noise that were found beside the level are left out, and it is no level by itself.
+touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine::NoiseFloor& floor,
+                               bool in_time) {
   touches::NoiseEstimate sigma = noise.sigma_s;
   sigma.gain_nats = kCertainNats;
   const bool plain = noise.slope.gain_nats == 0 && noise.degrees_of_freedom.gain_nats == 0 &&
@@ -183,7 +185,7 @@ touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine
                      noise.channel_sigma_s.empty();
   if (!plain || !floor.from_repeats) return sigma;
   const double floor_s = SharesTime(floor) ? floor.sigma_without_time : floor.sigma;
-  if (sigma.value <= floor_s + (floor.upper - floor.sigma)) return sigma;
+  if (!in_time && sigma.value <= floor_s + (floor.upper - floor.sigma)) return sigma;
   sigma.value = floor_s;
   sigma.std_error = floor_s / std::sqrt(2 * floor.degrees_of_freedom);
   return sigma;
@@ -203,7 +205,7 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   const bool has_sigma = std::any_of(
       given.effects.begin(), given.effects.end(),
       [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
-  const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor);
+  const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor, in_time);
   // Where ticks explain the scatter there is no further noise to be seen.
   const bool scatter = sigma.value > kMinSigmaS;
   // The level that a model has beside kinds of noise that are not assessed here says nothing by itself.

@@ -174,7 +174,7 @@ std::string RoundsInWords(const RoundStructure& rounds, double sigma_s) {
 }
 
 void NameRoundFirst(const RoundStructure& rounds, engine::UnexplainedRest* rest) {
-  rest->covariates.insert(rest->covariates.begin(), {"round", rounds.p, rounds.gain_nats});
+  engine::PutFirst({"round", rounds.p, rounds.gain_nats}, rest);
 }
 
 }  // namespace touchstone::diagnosis::selection

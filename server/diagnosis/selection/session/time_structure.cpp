@@ -156,16 +156,9 @@ bool SharesTime(const engine::NoiseFloor& floor) {
 
 void NameTimeFirst(const touches::Observations& o, const engine::NoiseFloor& floor,
                    engine::UnexplainedRest* rest) {
-  engine::CovariateTest time = {o.set->has_session_time ? "session_time_s" : "touch", floor.time_structure_p,
-                                0.5 * floor.time_structure_z * floor.time_structure_z};
-  std::vector<engine::CovariateTest>& tests = rest->covariates;
-  const auto same = std::find_if(tests.begin(), tests.end(),
-                                 [&](const engine::CovariateTest& test) { return test.name == time.name; });
-  if (same != tests.end()) {
-    time = *same;
-    tests.erase(same);
-  }
-  tests.insert(tests.begin(), time);
+  engine::PutFirst(
+      {touches::NameOfTime(o), floor.time_structure_p, 0.5 * floor.time_structure_z * floor.time_structure_z},
+      rest);
 }
 
 }  // namespace touchstone::diagnosis::selection

@@ -6,9 +6,10 @@
 namespace touchstone::diagnosis::touches {
 namespace {
 
-constexpr size_t kMinEqual = 4;      // delays at one place that make it a tick's
-constexpr double kOverDensity = 10;  // ... and over what the density of the delays gives
-constexpr int kMinTouches = 8;       // on the tick
+constexpr size_t kMinEqual = 4;            // delays at one place that make it a tick's
+constexpr double kOverDensity = 10;        // ... and over what the density of the delays gives
+constexpr int kMinTouches = 8;             // on the tick
+constexpr double kMaxShareOfOthers = 0.5;  // of the times of other fingers that lie on one finger's tick
 
 // Delays of the row's contacts after its first, s; those at once have none.
 std::vector<double> DelaysOf(const session::MeasurementSet& set, int row) {
@@ -76,6 +77,32 @@ bool LiesOnTick(const session::MeasurementSet& set, int row, double interval_s) 
   return std::all_of(delays_s.begin(), delays_s.end(), [interval_s](double delay_s) {
     return std::abs(delay_s - std::round(delay_s / interval_s) * interval_s) <= kTickToleranceS;
   });
+}
+
+FingerTicks FindFingerTicks(const Observations& o) {
+  std::vector<std::vector<double>> times_s(o.fingers);
+  for (int k = 0; k < o.size(); ++k)
+    for (int i = 0; i < o.fingers; ++i)
+      if (const double time_s = o.set->TimeS(o.row[k], i); std::isfinite(time_s) && time_s > kTickToleranceS)
+        times_s[i].push_back(time_s);
+  const auto share_on = [](const std::vector<double>& times, double interval_s) {
+    const auto on = std::count_if(times.begin(), times.end(), [interval_s](double time_s) {
+      return std::abs(time_s - std::round(time_s / interval_s) * interval_s) <= kTickToleranceS;
+    });
+    return times.empty() ? 0 : static_cast<double>(on) / static_cast<double>(times.size());
+  };
+  for (int i = 0; i < o.fingers; ++i) {
+    std::vector<double>& own = times_s[i];
+    if (own.size() < kMinTouches) continue;
+    std::sort(own.begin(), own.end());
+    const double interval_s = FindTick(own);
+    if (interval_s == 0 || share_on(own, interval_s) < 1) continue;
+    bool alone = true;
+    for (int j = 0; j < o.fingers; ++j)
+      alone &= j == i || share_on(times_s[j], interval_s) < kMaxShareOfOthers;
+    if (alone) return {i, interval_s};
+  }
+  return {};
 }
 
 TouchTicks FindTouchTicks(const Observations& o) {

@@ -27,6 +27,13 @@ struct TouchTicks {
 };
 TouchTicks FindTouchTicks(const Observations& observations);
 
+// The tick of one finger, on which its times lie and those of no other do: as the set has them, without those that are 0.
+struct FingerTicks {
+  int finger = 0;
+  double interval_s = 0;  // 0: none
+};
+FingerTicks FindFingerTicks(const Observations& observations);
+
 // Whether every contact of a row of the set lies on the tick, counted from the first.
 bool LiesOnTick(const session::MeasurementSet& set, int row, double interval_s);
 
