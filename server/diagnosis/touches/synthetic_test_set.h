@@ -103,6 +103,33 @@ struct SyntheticSet {
   }
 };
 
+// Five objects, 48 poses; contacts whose normals differ from finger to finger.
+inline SyntheticSet TiltedSet(uint64_t seed, int rounds = 4) {
+  SyntheticSet set(5, 48, rounds, kSyntheticSigmaS, seed);
+  RandomStream random(1, RandomDomain::kTest);
+  std::vector<Eigen::Vector3d> normal(set.observations.poses * 3), contact_m(normal.size());
+  for (size_t e = 0; e < normal.size(); ++e) {
+    normal[e] = Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()) * 0.25;
+    contact_m[e] = Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()) * 0.05;
+  }
+  for (int k = 0; k < set.size(); ++k)
+    for (int i = 0; i < 3; ++i) {
+      const size_t e = set.observations.pose[k] * 3 + i;
+      set.prediction.normal[k * 3 + i] = (normal[e] - set.observations.set->approach[k]).normalized();
+      set.prediction.contact_m[k * 3 + i] = contact_m[e];
+      set.prediction.cos_incidence[k * 3 + i] =
+          -set.prediction.normal[k * 3 + i].dot(set.observations.set->approach[k]);
+    }
+  return set;
+}
+
+// How much later finger i of touch k meets a surface that `move_m` has shifted.
+inline double LaterBy(const SyntheticSet& set, int k, int i, const Eigen::Vector3d& move_m) {
+  const Eigen::Vector3d& n = set.prediction.normal[k * 3 + i];
+  return n.dot(move_m) / n.dot(set.observations.set->approach[k]) *
+         set.prediction.inverse_speed_s_per_m[k * 3 + i];
+}
+
 // Contacts come early by 1 ms per degree of incidence, on every finger.
 inline SyntheticSet EarlyOnSlopes() {
   SyntheticSet set(5, 48, 4, kSyntheticSigmaS, 1);

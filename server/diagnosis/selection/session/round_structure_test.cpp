@@ -9,32 +9,12 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kNoiseS = 0.005;
-
-// Five objects, 48 poses, four rounds; contacts whose normals differ from finger to finger.
-touches::SyntheticSet TiltedSet(uint64_t seed) {
-  touches::SyntheticSet set(5, 48, 4, kNoiseS, seed);
-  RandomStream random(1, RandomDomain::kTest);
-  std::vector<Eigen::Vector3d> normal(set.observations.poses * 3), contact_m(normal.size());
-  for (size_t e = 0; e < normal.size(); ++e) {
-    normal[e] = Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()) * 0.25;
-    contact_m[e] = Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()) * 0.05;
-  }
-  for (int k = 0; k < set.size(); ++k)
-    for (int i = 0; i < 3; ++i) {
-      const size_t e = set.observations.pose[k] * 3 + i;
-      set.prediction.normal[k * 3 + i] = (normal[e] - set.observations.set->approach[k]).normalized();
-      set.prediction.contact_m[k * 3 + i] = contact_m[e];
-      set.prediction.cos_incidence[k * 3 + i] =
-          -set.prediction.normal[k * 3 + i].dot(set.observations.set->approach[k]);
-    }
-  return set;
-}
+constexpr double kNoiseS = touches::kSyntheticSigmaS;
 
 TEST(RoundStructure, IsCalibratedUnderNoise) {
   int below = 0;
   for (uint64_t seed = 0; seed < 40; ++seed) {
-    const touches::SyntheticSet set = TiltedSet(seed);
+    const touches::SyntheticSet set = touches::TiltedSet(seed);
     const RoundStructure found = FindRoundStructure(set.observations, set.prediction, set.residuals);
     below += found.p < 0.1;
     EXPECT_FALSE(SharesRounds(found, kNoiseS)) << seed;
@@ -45,17 +25,15 @@ TEST(RoundStructure, IsCalibratedUnderNoise) {
 }
 
 TEST(RoundStructure, SeesObjectsThatWerePutDownAnewAndHowFar) {
-  touches::SyntheticSet set = TiltedSet(50);
+  touches::SyntheticSet set = touches::TiltedSet(50);
   RandomStream random(2, RandomDomain::kTest);
   std::vector<Eigen::Vector3d> moved_m(5 * 4);
   for (Eigen::Vector3d& move_m : moved_m)
     move_m = Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal()) * 0.3e-3;
   for (int k = 0; k < set.size(); ++k)
     for (int i = 0; i < 3; ++i) {
-      const Eigen::Vector3d& n = set.prediction.normal[k * 3 + i];
-      const Eigen::Vector3d& move_m =
-          moved_m[set.observations.object[k] * 4 + set.observations.set->round[k]];
-      set.observations.time_s[k * 3 + i] += n.dot(move_m) / n.dot(set.observations.set->approach[k]) * 50;
+      set.observations.time_s[k * 3 + i] += touches::LaterBy(
+          set, k, i, moved_m[set.observations.object[k] * 4 + set.observations.set->round[k]]);
     }
   set.Finish();
   const RoundStructure found = FindRoundStructure(set.observations, set.prediction, set.residuals);
@@ -67,7 +45,7 @@ TEST(RoundStructure, SeesObjectsThatWerePutDownAnewAndHowFar) {
 // Few poses with most of the noise, whose contacts stand askew: the F test alone finds rounds in such sets.
 TEST(RoundStructure, IsNoNoiseThatIsLargerAtSomePoses) {
   for (uint64_t seed = 60; seed < 80; ++seed) {
-    touches::SyntheticSet set = TiltedSet(seed);
+    touches::SyntheticSet set = touches::TiltedSet(seed);
     RandomStream random(seed, RandomDomain::kTest);
     for (int k = 0; k < set.size(); ++k)
       for (int i = 0; i < 3; ++i) {

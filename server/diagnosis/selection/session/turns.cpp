@@ -40,10 +40,11 @@ struct Cell {
   double touches = 0;
 };
 
+// Turns of `period` touches beyond those of `known`, which divides it; 1: none.
 class Turn {
  public:
   Turn(const touches::Observations& o, const std::vector<double>& residuals, const std::vector<int>& places,
-       int period)
+       int period, int known)
       : means_(Eigen::MatrixXd::Zero(o.fingers, period)), cells_of_(period, 0) {
     std::map<std::pair<int, int>, Cell> cells;
     for (int k = 0; k < o.size(); ++k) {
@@ -53,26 +54,27 @@ class Turn {
       if (cell.touches++ == 0) cell.sum = Eigen::VectorXd::Zero(o.fingers);
       cell.sum += own;
     }
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(o.fingers);
-    Eigen::VectorXd touches = Eigen::VectorXd::Zero(period);
-    double squares = 0, all = 0;
+    Eigen::MatrixXd known_sums = Eigen::MatrixXd::Zero(o.fingers, known);
+    Eigen::VectorXd touches = Eigen::VectorXd::Zero(period), known_touches = Eigen::VectorXd::Zero(known);
+    double squares = 0;
     for (const auto& [key, cell] : cells) {
       means_.col(key.first) += cell.sum;
       touches[key.first] += cell.touches;
       ++cells_of_[key.first];
-      mean += cell.sum, all += cell.touches;
+      known_sums.col(key.first % known) += cell.sum;
+      known_touches[key.first % known] += cell.touches;
       squares += cell.sum.squaredNorm() / cell.touches;
     }
-    if (all == 0) return;
-    const double without = squares - mean.squaredNorm() / all;
-    double with = squares;
+    if (touches.minCoeff() == 0) return;
+    double with = squares, without = squares;
+    for (int place = 0; place < known; ++place)
+      without -= known_sums.col(place).squaredNorm() / known_touches[place];
     for (int place = 0; place < period; ++place) {
-      if (touches[place] == 0) return;
       with -= means_.col(place).squaredNorm() / touches[place];
       means_.col(place) /= touches[place];
     }
-    const double taken = (o.fingers - 1.0) * (period - 1);
-    const double rows = (o.fingers - 1.0) * (static_cast<double>(cells.size()) - 1);
+    const double taken = (o.fingers - 1.0) * (period - known);
+    const double rows = (o.fingers - 1.0) * (static_cast<double>(cells.size()) - known);
     if (!(with > 0) || !(rows > 2 * taken)) return;
     gain_nats_ = 0.5 * rows * std::log(without / with) - 0.5 * taken * std::log(rows);
     p_ = FisherTail((without - with) / taken / (with / (rows - taken)), taken, rows - taken);
@@ -95,16 +97,20 @@ std::optional<Turns> FindTurns(const touches::Observations& o, const std::vector
   if (o.fingers < 2) return std::nullopt;
   const std::vector<int> places = PlacesInSession(*o.set);
   Turns best;
-  // A multiple of a turn says the same with more values.
+  const double enough_nats = kTurnNats + std::log(kLongestTurn - 1.0);
   for (int period = 2; period <= kLongestTurn; ++period) {
-    const Turn turn(o, residuals, places, period);
-    if (!turn.IsFilled() || turn.gain_nats() <= best.gain_nats) continue;
+    // A multiple of a turn says the same with more values.
+    const bool multiple = best.period > 0 && period % best.period == 0;
+    const Turn turn(o, residuals, places, period, multiple ? best.period : 1);
+    if (!turn.IsFilled() ||
+        turn.gain_nats() < (multiple ? enough_nats : std::max(best.gain_nats, enough_nats)))
+      continue;
     best.period = period;
     best.gain_nats = turn.gain_nats();
     best.p = std::min(1.0, turn.p() * (kLongestTurn - 1));
     best.range_s = turn.Ranges().maxCoeff(&best.finger);
   }
-  if (best.gain_nats < kTurnNats + std::log(kLongestTurn - 1.0)) return std::nullopt;
+  if (best.period == 0) return std::nullopt;
   best.words = absl::StrFormat(
       "Touches take turns: finger %s is up to %s later at one place in a turn of %d touches than at another. "
       "Look for what is read or switched in turn (a multiplexer, two buffers), and for a tool or an object "
