@@ -65,10 +65,20 @@ TEST(MovingObject, IsNoneThatIsPutDownAnewEachRound) {
   }
 }
 
-// A finger that grows acts along the approach, wherever the surface slopes.
+// From above, a finger that grows looks like an object that tilts.
 TEST(MovingObject, IsNoFingerThatDrifts) {
-  touches::SyntheticSet set = touches::TiltedSet(9);
-  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3] += 30e-3 * k / set.size();
+  touches::SyntheticSet set(5, 48, 4, touches::kSyntheticSigmaS, 9);
+  auto from_above = std::make_shared<session::MeasurementSet>(*set.observations.set);
+  for (int k = 0; k < set.size(); ++k) {
+    from_above->approach[k] = -Eigen::Vector3d::UnitZ(), from_above->lateral[k] = Eigen::Vector3d::UnitX();
+    for (int i = 0; i < 3; ++i) {
+      set.prediction.normal[k * 3 + i] = Eigen::Vector3d::UnitZ();
+      set.prediction.contact_m[k * 3 + i] = Eigen::Vector3d((i - 1) * 0.02, 0, 0);
+      set.prediction.cos_incidence[k * 3 + i] = 1;
+    }
+    set.observations.time_s[k * 3] += 60e-3 * k / set.size();
+  }
+  set.observations.set = from_above;
   set.Finish();
   EXPECT_FALSE(MotionOf(set));
 }

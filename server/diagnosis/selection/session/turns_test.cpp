@@ -38,8 +38,20 @@ TEST(Turns, AreFoundWithTheirPeriodAndSize) {
 
 // A misfit is the same in all repeats of a pose, and poses come in the same order in every round.
 TEST(Turns, AreNoMisfitThatRepeats) {
-  const touches::SyntheticSet slopes = touches::EarlyOnSlopes();
-  EXPECT_FALSE(TurnsOf(slopes));
+  touches::SyntheticSet set(1, 48, 30, touches::kSyntheticSigmaS, 6);
+  RandomStream random(7, RandomDomain::kTest);
+  std::vector<double> late_s(48);
+  for (double& pose_s : late_s) pose_s = 20e-3 * random.Normal();
+  for (int k = 0; k < set.size(); ++k) set.observations.time_s[k * 3 + 1] += late_s[set.observations.pose[k]];
+  set.Finish();
+  EXPECT_FALSE(TurnsOf(set));
+}
+
+// Four places of which two and two say the same.
+TEST(Turns, AreNoMultipleOfTheirPeriod) {
+  const auto found = TurnsOf(InTurn({0, 30e-3}, 8, 1));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->period, 2);
 }
 
 TEST(Turns, AreNotFoundInNoise) {
