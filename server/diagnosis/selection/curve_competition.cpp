@@ -114,7 +114,7 @@ class Competition {
   }
 
   void NoteRival(const std::string& name, double ahead_nats, const std::string& words) {
-    const auto [rival, is_new] = result_.curve_rivals.try_emplace(name);
+    const auto [rival, is_new] = result_.nameless_rivals.try_emplace(name);
     if (!is_new && rival->second.ahead_nats >= ahead_nats) return;
     rival->second = {ahead_nats, words};
   }

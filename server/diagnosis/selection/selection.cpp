@@ -35,6 +35,8 @@ struct WithTerm {
   bool found = false;
   FormulaTerm term;
   engine::Explanation explanation;
+  // Of the best term, found or not: log evidence less the price of its complexity, over the rival's.
+  engine::NamelessRival nearest = {-INFINITY, ""};
 };
 
 // The index of the formula of this name among the effects that were added; -1: there is none.
@@ -46,15 +48,17 @@ int FindFormula(const engine::Fit& fit, int initial_effects, const std::string& 
   return -1;
 }
 
+// `rival`: the fit that it must be better than, beside `without` or in the place of what that lacks.
 absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::StepwiseSearch& search,
-                                  const engine::Explanation& without, const FormulaTerm* first) {
+                                  const engine::Explanation& without, const FormulaTerm* first,
+                                  const engine::Fit& rival) {
   const engine::Experiment& experiment = workspace.experiment;
   WithTerm best;
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction details,
                               workspace.searched_predictor->Run(without.fit.model.base(), true, true));
   const std::vector<FormulaTerm> terms = ScoreTerms(experiment, *workspace.rows, without.fit, details);
   const double penalty_nats = search.rules().complexity_penalty_nats;
-  double best_evidence = without.fit.log_evidence + search.rules().enter_nats + penalty_nats;
+  double best_evidence = rival.log_evidence + search.rules().enter_nats + penalty_nats;
   int fitted = 0;
   for (const FormulaTerm& candidate : terms) {
     if (fitted++ == kTermsFitted || candidate.gain_nats < 0.5 * penalty_nats) break;
@@ -73,15 +77,53 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::Step
     start.Add(*effect, false);
     absl::StatusOr<engine::Fit> fit = engine::FitModel(experiment, std::move(start));
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit.status();
-    if (!fit.ok() || fit->log_evidence <= best_evidence) continue;
-    const double gain =
-        1 - engine::HeldOutRmse(experiment, *fit) / engine::HeldOutRmse(experiment, without.fit);
+    if (!fit.ok()) continue;
+    if (const double ahead_nats = fit->log_evidence - penalty_nats - rival.log_evidence;
+        ahead_nats > best.nearest.ahead_nats)
+      best.nearest = {ahead_nats,
+                      absl::StrCat("A formula would say nearly the same: ", term.expression, ".")};
+    if (fit->log_evidence <= best_evidence) continue;
+    const double gain = 1 - engine::HeldOutRmse(experiment, *fit) / engine::HeldOutRmse(experiment, rival);
     if (gain < search.rules().min_relative_cv_gain) continue;
     best_evidence = fit->log_evidence;
     best.found = true;
     best.term = term;
     best.explanation.fit = *std::move(fit);
     best.explanation.initial_effects = without.initial_effects;
+  }
+  return best;
+}
+
+void NoteRival(const std::string& name, const engine::NamelessRival& nearest, SelectionResult* result) {
+  const auto [rival, is_new] = result->nameless_rivals.try_emplace(name, nearest);
+  if (!is_new && nearest.ahead_nats > rival->second.ahead_nats) rival->second = nearest;
+}
+
+// The same in the place of all effects that were found, and of each: what has no name may look like what has one. Notes how near
+// a term comes to each.
+absl::StatusOr<WithTerm> TryTermsInPlaceOfEffects(const Workspace& workspace,
+                                                  const engine::Explanation& found, SelectionResult* result) {
+  const std::vector<model::EffectInstance>& effects = found.fit.model.base().effects;
+  std::vector<std::vector<int>> places;  // from the last to the first
+  for (int index = static_cast<int>(effects.size()) - 1; index >= found.initial_effects; --index)
+    places.push_back({index});
+  if (places.size() > 1) {
+    std::vector<int> all;
+    for (const std::vector<int>& place : places) all.push_back(place[0]);
+    places.insert(places.begin(), all);
+  }
+  WithTerm best;
+  for (const std::vector<int>& place : places) {
+    engine::Parameterization rest = found.fit.model;
+    for (const int index : place) rest = rest.Without(index);
+    engine::Explanation without;
+    without.initial_effects = found.initial_effects;
+    TOUCHSTONE_ASSIGN_OR_RETURN(without.fit, engine::FitModel(workspace.experiment, std::move(rest)));
+    TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with,
+                                TryTerms(workspace, *result->search, without, nullptr, found.fit));
+    for (const int index : place) NoteRival(engine::NameOf(*effects[index].effect), with.nearest, result);
+    if (with.found && (!best.found || with.explanation.fit.log_evidence > best.explanation.fit.log_evidence))
+      best = std::move(with);
   }
   return best;
 }
@@ -107,7 +149,10 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
   result->formula = -1;
   FormulaTerm* first = nullptr;
   for (int terms = 0; terms < kMaxFormulaTerms; ++terms) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(workspace, search, best, first));
+    TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(workspace, search, best, first, best.fit));
+    if (!with.found && terms == 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(with, TryTermsInPlaceOfEffects(workspace, best, result));
+    }
     if (!with.found) break;
     // From scratch, with the formula's term as one effect among the others.
     const auto effect = MakeTermEffect(FormulaName(with.term), with.term);
@@ -136,8 +181,8 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
 
 absl::Status FindCompetingEffects(SelectionResult* result) {
   const engine::Explanation whole{result->fit, result->initial_effects};
-  TOUCHSTONE_ASSIGN_OR_RETURN(
-      result->steps, engine::FindCompetitors(*result->search, whole, result->formula, result->curve_rivals));
+  TOUCHSTONE_ASSIGN_OR_RETURN(result->steps, engine::FindCompetitors(*result->search, whole, result->formula,
+                                                                     result->nameless_rivals));
   return absl::OkStatus();
 }
 

@@ -51,7 +51,7 @@ struct SelectionResult {
   std::vector<FormulaTerm> terms;      // scored on what the named effects leave; empty if there is no formula
   std::vector<NamelessCurve> curves;   // over what the named effects leave, largest gain first
   std::optional<NamelessCurve> curve;  // the one that explains the rest, or stands beside the formula
-  std::map<std::string, engine::NamelessRival> curve_rivals;  // by the effect whose place they would take
+  std::map<std::string, engine::NamelessRival> nameless_rivals;  // by the effect whose place they would take
   std::vector<engine::SelectedStep> steps;
   engine::TriedPValues tried;  // of the model as it was given, over all that is tried
   touches::NoiseFindings noise;
