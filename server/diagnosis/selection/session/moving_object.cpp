@@ -13,13 +13,13 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
+#include "server/diagnosis/selection/session/repeats.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
 constexpr double kMovingNats = 10;
 constexpr double kMinMovingDegrees = 60;
-constexpr double kMinRepeatedShare = 0.25;  // of the touches, for repeats alone to tell
 constexpr double kMaxOrderShare = 0.3;  // of the variance of time that poses of unrepeated touches explain
 constexpr int kMaxMovingRounds = 20, kMaxMovingObjects = 20;
 constexpr int kTranslations = 3;

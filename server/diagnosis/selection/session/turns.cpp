@@ -7,12 +7,13 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <utility>
 
 #include <Eigen/Core>
 
+#include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/distributions.h"
 #include "server/base/text/readable_time.h"
+#include "server/diagnosis/selection/session/repeats.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
@@ -20,7 +21,7 @@ namespace {
 
 constexpr int kLongestTurn = 8;  // touches
 constexpr double kTurnNats = 10;
-constexpr int kMinCellsOfPlace = 8;  // readings at each place in the turn
+constexpr int kMinUnitsOfPlace = 8;  // readings at each place in the turn
 
 // Place of each row of the set in the order of the session.
 std::vector<int> PlacesInSession(const session::MeasurementSet& set) {
@@ -34,61 +35,138 @@ std::vector<int> PlacesInSession(const session::MeasurementSet& set) {
   return place;
 }
 
-// Touches of one pose at one place in the turn.
-struct Cell {
-  Eigen::VectorXd sum;
-  double touches = 0;
+// What a place in the turn is compared over: touches less the mean of their pose, where repeats of a pose have several places; else
+// the mean of a pose at a place, since a misfit is the same in all repeats. Scaled to the variance of one touch.
+struct Units {
+  std::vector<int> place;
+  Eigen::MatrixXd values;  // units x fingers
+  Eigen::MatrixXd known;   // units x what may say the same: place and direction of the pose
+  double degrees = 0;      // of freedom, of each finger
 };
+
+constexpr int kPoseFeatures = 10;  // 1, target, direction, its squares
+
+Eigen::RowVectorXd FeaturesOf(const session::MeasurementSet& set, int row) {
+  Eigen::RowVectorXd features(kPoseFeatures);
+  const Eigen::RowVector3d direction = set.approach[row].transpose();
+  features << 1, set.target_m[row].transpose(), direction, direction.cwiseProduct(direction);
+  return features;
+}
+
+struct Reading {
+  int k = 0, place = 0;
+  Eigen::RowVectorXd residual;
+};
+
+using ReadingsByPose = std::map<int, std::vector<Reading>>;
+
+ReadingsByPose ReadingsOf(const touches::Observations& o, const std::vector<double>& residuals,
+                          const std::vector<int>& places, int period) {
+  ReadingsByPose poses;
+  for (int k = 0; k < o.size(); ++k) {
+    const Eigen::Map<const Eigen::RowVectorXd> own(&residuals[static_cast<size_t>(k) * o.fingers], o.fingers);
+    if (o.used[k] && own.allFinite()) poses[o.pose[k]].push_back({k, places[o.row[k]] % period, own});
+  }
+  return poses;
+}
+
+void AddUnit(int place, const Eigen::RowVectorXd& value, const Eigen::RowVectorXd& known, Units* units) {
+  const auto n = static_cast<Eigen::Index>(units->place.size());
+  units->place.push_back(place);
+  units->values.row(n) = value, units->known.row(n) = known;
+}
+
+Units UnitsOf(const touches::Observations& o, const ReadingsByPose& poses) {
+  double all = 0, repeated = 0;
+  for (const auto& [pose, readings] : poses) {
+    all += static_cast<double>(readings.size());
+    const bool varies = std::any_of(readings.begin(), readings.end(),
+                                    [&](const Reading& r) { return r.place != readings[0].place; });
+    if (varies) repeated += static_cast<double>(readings.size()) - 1;
+  }
+  const bool from_repeats = repeated >= kMinRepeatedShare * all;
+  Units units;
+  units.values.resize(static_cast<Eigen::Index>(all), o.fingers);
+  units.known = Eigen::MatrixXd::Zero(units.values.rows(), kPoseFeatures);
+  for (const auto& [pose, readings] : poses) {
+    const Eigen::RowVectorXd features = FeaturesOf(*o.set, o.row[readings[0].k]);
+    std::map<int, std::vector<const Reading*>> by_place;
+    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(o.fingers);
+    for (const Reading& reading : readings)
+      by_place[reading.place].push_back(&reading), sum += reading.residual;
+    if (from_repeats) {
+      for (const Reading& reading : readings)
+        AddUnit(reading.place, reading.residual - sum / static_cast<double>(readings.size()),
+                Eigen::RowVectorXd::Zero(kPoseFeatures), &units);
+      units.degrees += static_cast<double>(readings.size()) - 1;
+      continue;
+    }
+    for (const auto& [place, own] : by_place) {
+      Eigen::RowVectorXd own_sum = Eigen::RowVectorXd::Zero(o.fingers);
+      for (const Reading* reading : own) own_sum += reading->residual;
+      const double root = std::sqrt(static_cast<double>(own.size()));
+      AddUnit(place, own_sum / root, features * root, &units);
+      units.degrees += 1;
+    }
+  }
+  const auto count = static_cast<Eigen::Index>(units.place.size());
+  units.values.conservativeResize(count, Eigen::NoChange);
+  units.known.conservativeResize(count, Eigen::NoChange);
+  return units;
+}
+
+// Columns of 1 where a unit has a place of a turn of `period`, scaled and centred as its values are.
+Eigen::MatrixXd PlaceColumns(const touches::Observations& o, const ReadingsByPose& poses, const Units& like,
+                             int period) {
+  ReadingsByPose marked = poses;
+  Eigen::MatrixXd columns(like.values.rows(), period);
+  for (int place = 0; place < period; ++place) {
+    for (auto& [pose, readings] : marked)
+      for (Reading& reading : readings)
+        reading.residual = Eigen::RowVectorXd::Constant(o.fingers, reading.place % period == place);
+    columns.col(place) = UnitsOf(o, marked).values.col(0);
+  }
+  return columns;
+}
 
 // Turns of `period` touches beyond those of `known`, which divides it; 1: none.
 class Turn {
  public:
   Turn(const touches::Observations& o, const std::vector<double>& residuals, const std::vector<int>& places,
-       int period, int known)
-      : means_(Eigen::MatrixXd::Zero(o.fingers, period)), cells_of_(period, 0) {
-    std::map<std::pair<int, int>, Cell> cells;
-    for (int k = 0; k < o.size(); ++k) {
-      const Eigen::Map<const Eigen::VectorXd> own(&residuals[static_cast<size_t>(k) * o.fingers], o.fingers);
-      if (!o.used[k] || !own.allFinite()) continue;
-      Cell& cell = cells[{places[o.row[k]] % period, o.pose[k]}];
-      if (cell.touches++ == 0) cell.sum = Eigen::VectorXd::Zero(o.fingers);
-      cell.sum += own;
+       int period, int known) {
+    const ReadingsByPose poses = ReadingsOf(o, residuals, places, period);
+    const Units units = UnitsOf(o, poses);
+    for (int place = 0; place < period; ++place)
+      if (std::count(units.place.begin(), units.place.end(), place) < kMinUnitsOfPlace) return;
+    Eigen::MatrixXd base(units.known.rows(), kPoseFeatures + known);
+    base << units.known, PlaceColumns(o, poses, units, known);
+    const Eigen::MatrixXd known_basis = ColumnSpan(base).Basis();
+    const auto beyond = [&](const Eigen::MatrixXd& columns) -> Eigen::MatrixXd {
+      return columns - known_basis * (known_basis.transpose() * columns);
+    };
+    const Eigen::MatrixXd values = beyond(units.values);
+    const ColumnSpan span(beyond(PlaceColumns(o, poses, units, period)));
+    const double fingers = o.fingers - 1.0, taken = fingers * static_cast<double>(span.rank());
+    const double degrees = fingers * (units.degrees - static_cast<double>(known_basis.cols()));
+    const double all = values.squaredNorm();
+    const double left = all - (span.Basis().transpose() * values).squaredNorm();
+    if (taken == 0 || !(left > 0) || !(degrees > 2 * taken)) return;
+    gain_nats_ = 0.5 * degrees * std::log(all / left) - 0.5 * taken * std::log(degrees);
+    p_ = FisherTail((all - left) / taken / (left / (degrees - taken)), taken, degrees - taken);
+    ranges_.resize(o.fingers);
+    for (int i = 0; i < o.fingers; ++i) {
+      const Eigen::VectorXd means = span.Solve(values.col(i));
+      ranges_[i] = means.maxCoeff() - means.minCoeff();
     }
-    Eigen::MatrixXd known_sums = Eigen::MatrixXd::Zero(o.fingers, known);
-    Eigen::VectorXd touches = Eigen::VectorXd::Zero(period), known_touches = Eigen::VectorXd::Zero(known);
-    double squares = 0;
-    for (const auto& [key, cell] : cells) {
-      means_.col(key.first) += cell.sum;
-      touches[key.first] += cell.touches;
-      ++cells_of_[key.first];
-      known_sums.col(key.first % known) += cell.sum;
-      known_touches[key.first % known] += cell.touches;
-      squares += cell.sum.squaredNorm() / cell.touches;
-    }
-    if (touches.minCoeff() == 0) return;
-    double with = squares, without = squares;
-    for (int place = 0; place < known; ++place)
-      without -= known_sums.col(place).squaredNorm() / known_touches[place];
-    for (int place = 0; place < period; ++place) {
-      with -= means_.col(place).squaredNorm() / touches[place];
-      means_.col(place) /= touches[place];
-    }
-    const double taken = (o.fingers - 1.0) * (period - known);
-    const double rows = (o.fingers - 1.0) * (static_cast<double>(cells.size()) - known);
-    if (!(with > 0) || !(rows > 2 * taken)) return;
-    gain_nats_ = 0.5 * rows * std::log(without / with) - 0.5 * taken * std::log(rows);
-    p_ = FisherTail((without - with) / taken / (with / (rows - taken)), taken, rows - taken);
   }
 
   double gain_nats() const { return gain_nats_; }
   double p() const { return p_; }
-  bool IsFilled() const { return *std::min_element(cells_of_.begin(), cells_of_.end()) >= kMinCellsOfPlace; }
-  Eigen::VectorXd Ranges() const { return means_.rowwise().maxCoeff() - means_.rowwise().minCoeff(); }
+  const Eigen::VectorXd& ranges() const { return ranges_; }
 
  private:
-  Eigen::MatrixXd means_;  // fingers x places
-  std::vector<int> cells_of_;
-  double gain_nats_ = 0, p_ = 1;
+  double gain_nats_ = -INFINITY, p_ = 1;
+  Eigen::VectorXd ranges_;  // of each finger
 };
 
 }  // namespace
@@ -102,13 +180,11 @@ std::optional<Turns> FindTurns(const touches::Observations& o, const std::vector
     // A multiple of a turn says the same with more values.
     const bool multiple = best.period > 0 && period % best.period == 0;
     const Turn turn(o, residuals, places, period, multiple ? best.period : 1);
-    if (!turn.IsFilled() ||
-        turn.gain_nats() < (multiple ? enough_nats : std::max(best.gain_nats, enough_nats)))
-      continue;
+    if (turn.gain_nats() < (multiple ? enough_nats : std::max(best.gain_nats, enough_nats))) continue;
     best.period = period;
     best.gain_nats = turn.gain_nats();
     best.p = std::min(1.0, turn.p() * (kLongestTurn - 1));
-    best.range_s = turn.Ranges().maxCoeff(&best.finger);
+    best.range_s = turn.ranges().maxCoeff(&best.finger);
   }
   if (best.period == 0) return std::nullopt;
   best.words = absl::StrFormat(

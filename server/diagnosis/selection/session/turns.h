@@ -20,8 +20,9 @@ struct Turns {
   std::string words;     // sentences for people
 };
 
-// Periods of 2 to 8 touches, of the session's order with touches that are left out counted; `residuals` [k * fingers + i].
-// Repeats of a pose at the same place in the turn are one reading, since a misfit is the same in all of them. Nothing where one mean says the same.
+// Periods of 2 to 8 touches, of the session's order with touches that are left out counted; `residuals` [k * fingers + i]. Repeats
+// of a pose are compared with one another where they have several places in the turn; else poses are, beside what depends on their
+// place and direction: touches that go round the faces of an object take turns without any cause. Nothing where no turn is ahead.
 std::optional<Turns> FindTurns(const touches::Observations& observations,
                                const std::vector<double>& residuals);
 

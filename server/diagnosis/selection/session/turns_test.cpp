@@ -47,6 +47,22 @@ TEST(Turns, AreNoMisfitThatRepeats) {
   EXPECT_FALSE(TurnsOf(set));
 }
 
+// Touches that go round six faces, with an error that depends on the face.
+TEST(Turns, AreNoFacesInTurn) {
+  for (const int rounds : {1, 4}) {
+    touches::SyntheticSet set(1, 96, rounds, touches::kSyntheticSigmaS, 8);
+    auto faces = std::make_shared<session::MeasurementSet>(*set.observations.set);
+    for (int k = 0; k < set.size(); ++k) {
+      const int face = set.observations.pose[k] % 6;
+      faces->approach[k] = (face % 2 ? 1 : -1) * Eigen::Vector3d::Unit(face / 2);
+      set.observations.time_s[k * 3 + 1] += 4e-3 * face * (face % 2 ? 1 : -1);
+    }
+    set.observations.set = faces;
+    set.Finish();
+    EXPECT_FALSE(TurnsOf(set)) << rounds;
+  }
+}
+
 // Four places of which two and two say the same.
 TEST(Turns, AreNoMultipleOfTheirPeriod) {
   const auto found = TurnsOf(InTurn({0, 30e-3}, 8, 1));
