@@ -32,10 +32,10 @@ std::string Parameter(const v1::ParameterValue& parameter, bool named) {
   return named ? absl::StrCat(ParameterName(parameter), " ", text) : text;
 }
 
-// The finger alone names a parameter of which there is one per finger.
-bool OnlyFingersDiffer(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& parameters) {
+// Finger and object name the values of an effect that has one parameter for each.
+bool HasOneParameter(const google::protobuf::RepeatedPtrField<v1::ParameterValue>& parameters) {
   return !parameters.empty() && std::all_of(parameters.begin(), parameters.end(), [&](const auto& p) {
-    return p.name() == parameters[0].name() && !p.finger().empty() && p.object().empty();
+    return p.name() == parameters[0].name() && !(p.finger().empty() && p.object().empty());
   });
 }
 
@@ -44,10 +44,12 @@ template <typename Effect>
 void AddEffect(const Effect& effect, const std::string& name, double probability, const std::string& change,
                const std::string& note, TextLayout::Style style, std::vector<std::vector<TextCell>>* rows) {
   auto parameters = effect.parameters();
-  if (OnlyFingersDiffer(parameters)) {
+  if (HasOneParameter(parameters)) {
     for (auto& parameter : parameters) {
-      parameter.set_name(parameter.finger());
+      const bool both = !parameter.finger().empty() && !parameter.object().empty();
+      parameter.set_name(absl::StrCat(parameter.finger(), both ? ", " : "", parameter.object()));
       parameter.clear_finger();
+      parameter.clear_object();
     }
   }
   const bool named =
