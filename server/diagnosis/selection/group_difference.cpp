@@ -35,6 +35,7 @@ constexpr int kOrders = 199;
 constexpr int kSteps = 4;           // of Gauss and Newton
 constexpr double kVisible = 1e-6;   // share of a column's square that differs within poses
 constexpr double kClearErrors = 3;  // of a value that is worth a word
+constexpr double kMaxLeft = 0.98;   // of the squares, by what describes a difference
 constexpr size_t kMaxPartsNamed = 2, kMaxAlso = 3;
 
 // One effect in one part.
@@ -258,7 +259,10 @@ class DifferenceSearch {
       engine::Parameterization there = fitted.start;
       Eigen::VectorXd point = there.Start();
       point.tail(d.values) += fitted.more;
-      there.MoveTo(there.Clip(point));
+      const Eigen::VectorXd within = there.Clip(point);
+      // A value beyond its bounds, as less of what the given model has, is known by the line alone.
+      if (within != point) break;
+      there.MoveTo(within);
       TOUCHSTONE_ASSIGN_OR_RETURN(const engine::Fit at,
                                   engine::FitModel(workspace_.experiment, std::move(there), 0));
       const Eigen::VectorXd left =
@@ -309,20 +313,25 @@ class DifferenceSearch {
             value.name, value.entry.empty() ? "" : " ", value.entry, value.value > 0 ? " +" : " ",
             ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
-    std::string words =
-        absl::StrCat("Something was other ", absl::StrJoin(places, ", or "), ": ", found.effect,
-                     " differs there by ", values.empty() ? "little" : absl::StrJoin(values, ", "));
-    if (!found.also.empty())
-      absl::StrAppend(&words, " (", absl::StrJoin(found.also, ", "), found.also.size() > 1 ? " say" : " says",
-                      " nearly the same)");
-    absl::StrAppend(
-        &words, ". Touches of one pose differ by ", scatter(residuals_.squaredNorm()), ", and by ",
-        scatter(left.squaredNorm()), " once it is taken off",
-        IsMoreThan(d, left)
-            ? "; that is not the whole of it, for those touches still differ by more than the others"
-            : "",
-        ". Find what changed, or measure those touches again: everything else "
-        "here was found on the other touches.");
+    std::string words = absl::StrCat("Something was other ", absl::StrJoin(places, ", or "));
+    if (values.empty() || left.squaredNorm() > kMaxLeft * residuals_.squaredNorm()) {
+      absl::StrAppend(&words, ", and no effect says what: touches of one pose differ by ",
+                      scatter(residuals_.squaredNorm()), " where those are among them");
+    } else {
+      absl::StrAppend(&words, ": ", found.effect, " differs there by ", absl::StrJoin(values, ", "));
+      if (!found.also.empty())
+        absl::StrAppend(&words, " (", absl::StrJoin(found.also, ", "),
+                        found.also.size() > 1 ? " say" : " says", " nearly the same)");
+      absl::StrAppend(
+          &words, ". Touches of one pose differ by ", scatter(residuals_.squaredNorm()), ", and by ",
+          scatter(left.squaredNorm()), " once it is taken off",
+          IsMoreThan(d, left)
+              ? "; that is not the whole of it, for those touches still differ by more than the others"
+              : "");
+    }
+    absl::StrAppend(&words,
+                    ". Find what changed, or measure those touches again: everything else "
+                    "here was found on the other touches.");
     if (parts_[d.part].of_rounds && workspace_.input.set->round.empty())
       absl::StrAppend(&words, " Round 0 is the first touch of each pose.");
     return words;

@@ -51,7 +51,7 @@ void NoiseQuestions::AskFingerTicks() {
                       model::FingerName(ticks.finger, observations_.fingers), TimeInWords(ticks.interval_s)));
 }
 
-// Repeats differ by what depends on time or on the touch before, which is no play.
+// Repeats differ by what depends on time or on the touch before, which is neither play nor scatter.
 void NoiseQuestions::AskPlay() {
   pose_scatter_ = FindPoseScatter(observations_, ladder_->prediction, residuals_with_rest_, selection_.noise);
   if (pose_scatter_ && pose_scatter_->ahead) found_->Add(Hypothesis::kPlay, pose_scatter_->words);
@@ -64,7 +64,7 @@ bool NoiseQuestions::ScatterHasAShape() const {
 }
 
 touches::NoiseSample NoiseQuestions::Sample() const {
-  return touches::MakeNoiseSample(observations_, ladder_->residuals, ladder_->prediction);
+  return touches::MakeNoiseSample(observations_, residuals_with_rest_, ladder_->prediction);
 }
 
 // Where something else makes touches scatter, parts of the set scatter differently for that reason; repeats know nothing
