@@ -110,6 +110,23 @@ TEST(GroupDifference, SaysWhereOneEffectIsNotTheWholeOfIt) {
   EXPECT_THAT(two.result.group->words, ::testing::HasSubstr("not the whole of it"));
 }
 
+// A round whose times are those of other touches is no effect's.
+TEST(GroupDifference, SaysWhereNoEffectTellsWhatWasOther) {
+  DiagnosisInput input = WithEffectIn({}, InRound2);
+  auto set = std::make_shared<session::MeasurementSet>(*input.set);
+  std::vector<int> rows;
+  for (int row = 0; row < set->size(); ++row)
+    if (InRound2(row / 24 % 4, row)) rows.push_back(row);
+  for (size_t n = 0; n < rows.size(); ++n)
+    for (int i = 0; i < 3; ++i)
+      set->time_s[rows[n] * 3 + i] = input.set->time_s[rows[(n * 29 + 11) % rows.size()] * 3 + i];
+  input.set = set;
+  const Selected selected = SelectFor(input);
+  ASSERT_TRUE(selected.result.group.has_value());
+  EXPECT_THAT(selected.result.group->words,
+              ::testing::HasSubstr("Something was other in round 2, and no effect says what"));
+}
+
 // Times that are off by less than files are rounded to have a pattern and no cause.
 TEST(GroupDifference, IsNotClaimedWithinRounding) {
   touches::HiddenRig rig;
