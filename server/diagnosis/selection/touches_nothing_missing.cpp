@@ -8,6 +8,8 @@
 #include "server/base/status.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/session/pose_columns.h"
+#include "server/diagnosis/selection/session/turns.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 
@@ -49,6 +51,8 @@ class Tester {
     TOUCHSTONE_ASSIGN_OR_RETURN(details_,
                                 workspace_.searched_predictor->Run(*workspace_.input.model, true, true));
     AddCurves();
+    AddTurns();
+    AddMovingObject();
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd residuals, DataAndDraws());
     // What is left is less than numbers are rounded to: it has no noise, and its pattern is that of rounding.
     const double rms_s =
@@ -74,22 +78,49 @@ class Tester {
     for (const CurveCovariate& covariate : ListCurveCovariates(o_, details_)) {
       const auto [mean, deviation] = MeanAndDeviation(covariate);
       if (!(deviation > 0)) continue;
-      Eigen::MatrixXd columns(contrasts_.rows(), o_.fingers * (kCurveDegree + 1));
-      std::vector<double> per_finger(o_.time_s.size());
-      for (int finger = 0; finger < o_.fingers; ++finger)
-        for (int degree = 0; degree <= kCurveDegree; ++degree) {
-          for (int k = 0; k < o_.size(); ++k)
-            for (int i = 0; i < o_.fingers; ++i) {
-              const size_t e = static_cast<size_t>(k) * o_.fingers + i;
-              const double value = (covariate.value(k, i) - mean) / deviation;
-              per_finger[e] = i == finger && std::isfinite(value)
-                                  ? std::pow(value, degree) * details_.inverse_speed_s_per_m[e]
-                                  : 0;
-            }
-          columns.col(finger * (kCurveDegree + 1) + degree) = contrasts_.Apply(per_finger);
-        }
-      hypotheses_.Add(columns);
+      AddPerFinger(o_.fingers * (kCurveDegree + 1),
+                   [&, mean = mean, deviation = deviation](int k, int i, int column) {
+                     const double value = (covariate.value(k, i) - mean) / deviation;
+                     if (column / (kCurveDegree + 1) != i || !std::isfinite(value)) return 0.0;
+                     return std::pow(value, column % (kCurveDegree + 1)) *
+                            details_.inverse_speed_s_per_m[static_cast<size_t>(k) * o_.fingers + i];
+                   });
     }
+  }
+
+  // A mean of each finger at each place in a turn.
+  void AddTurns() {
+    const std::vector<int> places = PlacesInSession(*o_.set);
+    for (int period = 2; period <= kLongestTurn; ++period)
+      AddPerFinger(o_.fingers * period, [&](int k, int i, int column) {
+        return column == i * period + places[o_.row[k]] % period ? 1.0 : 0.0;
+      });
+  }
+
+  // An object that shifts, or turns, by as much from touch to touch.
+  void AddMovingObject() {
+    for (const int first : {0, kPoseValues / 2}) {
+      std::vector<Eigen::MatrixXd> poses(o_.size());
+      for (int k = 0; k < o_.size(); ++k)
+        if (HasPoseColumns(o_, details_, o_.time_s, k)) poses[k] = PoseColumns(o_, details_, k);
+      AddPerFinger(kPoseValues / 2, [&](int k, int i, int column) {
+        return poses[k].size() > 0 ? poses[k](i, first + column) * k : 0;
+      });
+    }
+  }
+
+  // `value(k, finger, column)`: what a column adds to a time, in any unit.
+  template <typename Value>
+  void AddPerFinger(int count, const Value& value) {
+    Eigen::MatrixXd columns(contrasts_.rows(), count);
+    std::vector<double> per_finger(o_.time_s.size());
+    for (int column = 0; column < count; ++column) {
+      for (int k = 0; k < o_.size(); ++k)
+        for (int i = 0; i < o_.fingers; ++i)
+          per_finger[static_cast<size_t>(k) * o_.fingers + i] = value(k, i, column);
+      columns.col(column) = contrasts_.Apply(per_finger);
+    }
+    hypotheses_.Add(columns);
   }
 
   std::pair<double, double> MeanAndDeviation(const CurveCovariate& covariate) const {
@@ -122,15 +153,19 @@ class Tester {
     return residuals;
   }
 
-  // Of times that lie on a tick, all or a part, where the given model has none: each would with 2 tolerance / tick.
+  // Of times that lie on a tick, all, a part or one finger's, where the given model has none: each would with 2 tolerance / tick.
   double TicksP() const {
     const auto& given = workspace_.input.model->effects;
     const bool declared = std::any_of(given.begin(), given.end(), [](const model::EffectInstance& instance) {
       return instance.effect->role == model::EffectRole::kQuantisation;
     });
+    if (declared) return 1;
     const touches::TouchTicks ticks = touches::FindTouchTicks(o_);
-    if (declared || ticks.interval_s == 0) return 1;
-    return std::pow(2 * touches::kTickToleranceS / ticks.interval_s, ticks.touches);
+    const touches::FingerTicks own = touches::FindFingerTicks(o_);
+    const auto by_chance = [](double interval_s, int times) {
+      return interval_s > 0 ? std::pow(2 * touches::kTickToleranceS / interval_s, times) : 1;
+    };
+    return std::min(by_chance(ticks.interval_s, ticks.touches), by_chance(own.interval_s, own.times));
   }
 
   // What the noise looks like and what repeats share, of each draw (columns), whatever its size.

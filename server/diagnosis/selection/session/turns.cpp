@@ -19,21 +19,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kLongestTurn = 8;  // touches
 constexpr double kTurnNats = 10;
 constexpr int kMinUnitsOfPlace = 8;  // readings at each place in the turn
-
-// Place of each row of the set in the order of the session.
-std::vector<int> PlacesInSession(const session::MeasurementSet& set) {
-  std::vector<int> order(set.size());
-  std::iota(order.begin(), order.end(), 0);
-  if (set.has_session_time)
-    std::stable_sort(order.begin(), order.end(),
-                     [&](int a, int b) { return set.session_time_s[a] < set.session_time_s[b]; });
-  std::vector<int> place(order.size());
-  for (size_t n = 0; n < order.size(); ++n) place[order[n]] = static_cast<int>(n);
-  return place;
-}
 
 // What a place in the turn is compared over: touches less the mean of their pose, where repeats of a pose have several places; else
 // the mean of a pose at a place, since a misfit is the same in all repeats. Scaled to the variance of one touch.
@@ -170,6 +157,17 @@ class Turn {
 };
 
 }  // namespace
+
+std::vector<int> PlacesInSession(const session::MeasurementSet& set) {
+  std::vector<int> order(set.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (set.has_session_time)
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return set.session_time_s[a] < set.session_time_s[b]; });
+  std::vector<int> place(order.size());
+  for (size_t n = 0; n < order.size(); ++n) place[order[n]] = static_cast<int>(n);
+  return place;
+}
 
 std::optional<Turns> FindTurns(const touches::Observations& o, const std::vector<double>& residuals) {
   if (o.fingers < 2) return std::nullopt;

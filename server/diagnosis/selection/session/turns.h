@@ -11,6 +11,11 @@
 
 namespace touchstone::diagnosis::selection {
 
+inline constexpr int kLongestTurn = 8;  // touches
+
+// Place of each row of the set in the order of the session.
+std::vector<int> PlacesInSession(const session::MeasurementSet& set);
+
 struct Turns {
   int period = 0;        // touches
   double p = 1;          // of so large a gain by chance (F test, all periods)

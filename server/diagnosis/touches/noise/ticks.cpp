@@ -100,7 +100,7 @@ FingerTicks FindFingerTicks(const Observations& o) {
     bool alone = true;
     for (int j = 0; j < o.fingers; ++j)
       alone &= j == i || share_on(times_s[j], interval_s) < kMaxShareOfOthers;
-    if (alone) return {i, interval_s};
+    if (alone) return {i, interval_s, static_cast<int>(own.size())};
   }
   return {};
 }

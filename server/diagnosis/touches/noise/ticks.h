@@ -31,6 +31,7 @@ TouchTicks FindTouchTicks(const Observations& observations);
 struct FingerTicks {
   int finger = 0;
   double interval_s = 0;  // 0: none
+  int times = 0;          // that lie on it
 };
 FingerTicks FindFingerTicks(const Observations& observations);
 
