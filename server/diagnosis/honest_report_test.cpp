@@ -239,5 +239,29 @@ TEST(HonestReport, ARoundAtAnotherSpeedIsAMistakeOfTheFile) {
   EXPECT_EQ(diagnosis.data_problems[0].kind, engine::ProblemKind::kSpeedFactor);
 }
 
+// Kind: a mistake of the file explains more than what was found without it.
+TEST(HonestReport, ASlipThatGrowsIsNoRoundAtAnotherSpeed) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 8;
+  DiagnosisInput input = touches::MakeTestInput(rig);
+  rig.hidden = {{"oblique_slip", {"travel_mm=1.2"}}};
+  const DiagnosisInput slipping = touches::MakeTestInput(rig);
+  // The objects take turns, so that rounds follow one another: the session's time, and with it the slip.
+  const int per_object = input.set->size() / 3, per_round = per_object / 3;
+  const report::Diagnosis diagnosis = Diagnosed(Spoilt(input, [&](auto* set) {
+    for (int row = 0; row < set->size(); ++row) {
+      const int within = row % per_object, round = within / per_round;
+      set->session_time_s[row] = 9.0 * (3 * per_round * round + 3 * (within % per_round) + row / per_object);
+      const double share = set->session_time_s[row] / (9.0 * set->size());
+      for (int i = 0; i < 3; ++i)
+        set->time_s[row * 3 + i] += share * (slipping.set->time_s[row * 3 + i] - set->time_s[row * 3 + i]);
+    }
+  }));
+  EXPECT_EQ(diagnosis.verdict, engine::Verdict::kUnexplained);
+  ASSERT_TRUE(diagnosis.data[0].unexplained.has_value());
+  EXPECT_THAT(diagnosis.data[0].unexplained->formula,
+              HasSubstr("tan(incidence_deg*pi/180) * session_time_s"));
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include <absl/strings/str_cat.h>
 
@@ -14,6 +15,7 @@
 #include "server/diagnosis/answers/how_wrong.h"
 #include "server/diagnosis/answers/uncertainty_reports.h"
 #include "server/diagnosis/checks/data_problems.h"
+#include "server/diagnosis/checks/rows/round_speed.h"
 #include "server/diagnosis/design/propose.h"
 #include "server/diagnosis/distributions/pose_free.h"
 #include "server/diagnosis/progress_gate.h"
@@ -141,6 +143,25 @@ bool SpeedSaysTheSame(const selection::GroupDifference& group) {
   return false;
 }
 
+// Whether repeats agree better with one round at another speed than with what was found, which may be a change in time.
+absl::StatusOr<bool> RoundSpeedSaysMore(const selection::Workspace& workspace,
+                                        const selection::SelectionResult& selection) {
+  const touches::Observations& o = *workspace.observations;
+  const checks::RoundSpeed speed = checks::FindRoundSpeed(o);
+  touches::Prediction fixed = workspace.nominal;
+  const std::set<int> rows(speed.rows.begin(), speed.rows.end());
+  for (int k = 0; k < o.size(); ++k)
+    if (rows.count(o.row[k]) > 0)
+      for (int i = 0; i < o.fingers; ++i)
+        fixed.time_s[static_cast<size_t>(k) * o.fingers + i] /= speed.factor;
+  TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction found,
+                              workspace.predictor->Run(selection.fit.model.base(), false, false));
+  const auto scatter = [&o](const touches::Prediction& prediction) {
+    return selection::NoiseFloorOf(o, touches::Residuals(o, prediction), 0).sigma;
+  };
+  return scatter(fixed) <= scatter(found);
+}
+
 // `always`: Propose, which names touches even where nothing is confounded.
 absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max_touches, bool always,
                                             const DiagnosisContext& context) {
@@ -175,7 +196,10 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
                               selection::SelectExplanation(workspace.get()));
   if (!selection.group || SpeedSaysTheSame(*selection.group)) {
     const std::vector<engine::DataProblem> of_round = checks::FindRoundAtAnotherSpeed(input, context.pool);
-    if (!of_round.empty()) return check_data(of_round);
+    if (!of_round.empty()) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool says_more, RoundSpeedSaysMore(*workspace, selection));
+      if (says_more) return check_data(of_round);
+    }
   }
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);

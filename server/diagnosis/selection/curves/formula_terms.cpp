@@ -79,7 +79,7 @@ class TermTable {
 Unit UnitOfFactor(const FormulaTerm& term) {
   const auto about = [&](const char* prefix) { return term.covariate.rfind(prefix, 0) == 0; };
   const bool ratio = about("approach") || about("lateral") || about("normal") ||
-                     term.expression.find("pi/180") != std::string::npos;
+                     (about("incidence") && term.expression.find("pi/180") != std::string::npos);
   return !ratio ? Unit::kNone : term.adds_time ? Unit::kMicrosecond : Unit::kMillimetre;
 }
 

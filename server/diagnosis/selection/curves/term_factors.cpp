@@ -17,6 +17,13 @@ double ThreeDigits(double value) {
   return unit >= 1 ? std::round(value / unit) * unit : std::round(value / unit) / std::round(1 / unit);
 }
 
+// Of the incidence of each finger's contact, up to where a contact is hardly one.
+double TangentOfIncidence(const touches::Prediction& d, size_t e) {
+  const double cosine = std::clamp(d.cos_incidence[e], 0.1, 1.0);
+  return std::sqrt(1 / (cosine * cosine) - 1);
+}
+constexpr char kTangent[] = "tan(incidence_deg*pi/180)";
+
 }  // namespace
 
 std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const touches::Prediction& d) {
@@ -60,9 +67,9 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
       [travel_mm, mean_mm](int k, int i) { return std::abs(travel_mm(k, i) - mean_mm); });
 
   const TermValue cosine = [&d, at](int k, int i) { return std::clamp(d.cos_incidence[at(k, i)], 0.1, 1.0); };
-  const TermValue tangent = [cosine](int k, int i) { return std::sqrt(1 / std::pow(cosine(k, i), 2) - 1); };
-  add("incidence_deg", "tan(incidence_deg*pi/180)", true, kSimpleNats, tangent);
-  add("incidence_deg", "tan(incidence_deg*pi/180)^2", true, kSimpleNats,
+  const TermValue tangent = [&d, at](int k, int i) { return TangentOfIncidence(d, at(k, i)); };
+  add("incidence_deg", kTangent, true, kSimpleNats, tangent);
+  add("incidence_deg", absl::StrCat(kTangent, "^2"), true, kSimpleNats,
       [tangent](int k, int i) { return std::pow(tangent(k, i), 2); });
   add("incidence_deg", "(1/cos(incidence_deg*pi/180) - 1)", true, kCurvedNats,
       [cosine](int k, int i) { return 1 / cosine(k, i) - 1; });
@@ -139,6 +146,10 @@ std::vector<FingerFactor> ListFingerFactors(const touches::Observations& o, cons
   if (o.fingers > 3)
     factors.push_back({"finger^2", [middle](int, int i) { return (i - middle) * (i - middle); }});
   factors.push_back({"first", [&d](int k, int i) { return d.first_finger[k] == i ? 1.0 : 0.0; }});
+  // A slip that depends on something.
+  factors.push_back({kTangent, [&o, &d](int k, int i) {
+                       return TangentOfIncidence(d, static_cast<size_t>(k) * o.fingers + i);
+                     }});
   return factors;
 }
 
