@@ -11,13 +11,19 @@
 namespace touchstone::client {
 namespace {
 
+constexpr size_t kMaxOthersNamed = 3;  // that could be meant as well; more are counted
+
 std::string Steps(const v1::Report& report) {
   std::vector<std::string> names;
   for (const v1::Step& step : report.steps()) {
     // "a (or b) and c": brackets keep the two apart.
     const std::vector<std::string> others(step.equivalent().begin(), step.equivalent().end());
+    const bool counted = others.size() > kMaxOthersNamed;
     const bool alone = report.steps_size() == 1 || others.empty();
-    names.push_back(alone ? StepName(step) : absl::StrCat(step.effect(), " (or ", Join(others, "or"), ")"));
+    const std::string rest = counted ? absl::StrCat(others.size(), " others") : Join(others, "or");
+    names.push_back(!alone    ? absl::StrCat(step.effect(), " (or ", rest, ")")
+                    : counted ? RungName(step)
+                              : StepName(step));
   }
   return Join(names, "and");
 }

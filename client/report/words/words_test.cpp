@@ -83,6 +83,14 @@ TEST(TimeChange, SharesOneUnit) {
   EXPECT_EQ(TimeChange(1200, 815), "1.20 -> 0.82 ms");
 }
 
+TEST(Headline, CountsEffectsThatAreTooManyToName) {
+  v1::Report report = MissingEffectsReport();
+  report.mutable_steps()->RemoveLast();
+  for (const char* name : {"tool_tilt", "object_scale", "clock_skew"})
+    report.mutable_steps(0)->add_equivalent(name);
+  EXPECT_THAT(Headline(report), HasSubstr("The model lacks tip_radius or 4 others; with it"));
+}
+
 TEST(Headline, SaysEveryVerdictInOneSentence) {
   EXPECT_EQ(Headline(MissingEffectsReport()),
             "The model lacks tip_radius (or surface_offset) and channel_latency; with them the error falls "
