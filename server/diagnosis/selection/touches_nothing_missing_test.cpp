@@ -1,5 +1,8 @@
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 
+#include <cmath>
+#include <functional>
+
 #include <gtest/gtest.h>
 
 #include "server/base/test_tier.h"
@@ -10,8 +13,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-engine::NothingMissing TestOf(const touches::HiddenRig& rig) {
-  const absl::StatusOr<std::unique_ptr<Workspace>> workspace = MakeWorkspace(touches::MakeTestInput(rig), {});
+engine::NothingMissing TestOf(const DiagnosisInput& input) {
+  const absl::StatusOr<std::unique_ptr<Workspace>> workspace = MakeWorkspace(input, {});
   EXPECT_TRUE(workspace.ok()) << workspace.status();
   EXPECT_TRUE(PrepareSearch(workspace->get(), {}).ok());
   const engine::StepwiseSearch search((*workspace)->experiment,
@@ -23,6 +26,10 @@ engine::NothingMissing TestOf(const touches::HiddenRig& rig) {
   const absl::StatusOr<engine::TriedPValues> tried = TryOnTouches(**workspace, *columns);
   EXPECT_TRUE(tried.ok()) << tried.status();
   return tried.ok() ? engine::WorstOfAll(*tried) : engine::NothingMissing();
+}
+
+engine::NothingMissing TestOf(const touches::HiddenRig& rig) {
+  return TestOf(touches::MakeTestInput(rig));
 }
 
 touches::HiddenRig SmallRig(uint64_t seed) {
@@ -62,6 +69,21 @@ TEST(TouchesNothingMissing, IsSmallForEachKindOfCause) {
   EXPECT_LT(p_of("formula", {"name=wave", "adds=travel_mm", "expression=0.2*finger*sin(session_time_s/200)"}),
             1e-4);
   EXPECT_LT(p_of("finger_noise", {"sigma_us=0,0,9000"}), 0.02);
+}
+
+// Kinds: what a verdict is given for is among the hypotheses.
+TEST(TouchesNothingMissing, IsSmallForTicksAndTurnsOfAFinger) {
+  using Change = std::function<double(int row, double time_s)>;
+  const Change changes[] = {[](int, double time_s) { return std::round(time_s * 2000) / 2000; },
+                            [](int row, double time_s) { return time_s + (row % 5 == 0 ? 0.006 : 0); }};
+  for (const Change& change : changes) {
+    DiagnosisInput input = touches::MakeTestInput(SmallRig(3));
+    auto set = std::make_shared<session::MeasurementSet>(*input.set);
+    for (int row = 0; row < set->size(); ++row)
+      set->time_s[row * 3 + 1] = change(row, set->time_s[row * 3 + 1]);
+    input.set = set;
+    EXPECT_LT(TestOf(input).p, 1e-3);
+  }
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST(Ladder, AWaveInTimeIsNoPlayOfTheArm) {
 // Kind: means that look like scatter are no noise of a finger.
 TEST(Ladder, EverySecondTouchThatIsLateIsNoNoiseOfAFinger) {
   const Ladder ladder = LadderOf(
-      [](const Touched& touch, int finger) { return finger == 1 && touch.row % 2 == 1 ? 0.006 : 0; });
+      [](const Touched& touch, int finger) { return finger == 1 && touch.row % 2 == 1 ? 0.009 : 0; });
   EXPECT_EQ(ladder.verdict, engine::Verdict::kUnexplained);
   EXPECT_THAT(ladder.steps, Each(Field(&engine::LadderStep::effect, Ne("finger_noise"))));
   ASSERT_TRUE(ladder.unexplained.has_value());
@@ -93,7 +93,7 @@ TEST(Ladder, EverySecondTouchThatIsLateIsNoNoiseOfAFinger) {
 // Kind: what has no name takes the place of an effect that looks like it.
 TEST(Ladder, AClockOfOneFingerIsNoLength) {
   const Ladder ladder =
-      LadderOf([](const Touched& touch, int finger) { return finger == 2 ? 0.006 * touch.time_s[2] : 0; });
+      LadderOf([](const Touched& touch, int finger) { return finger == 2 ? 0.0025 * touch.time_s[2] : 0; });
   EXPECT_EQ(ladder.verdict, engine::Verdict::kUnexplained);
   EXPECT_THAT(ladder.steps, Each(Field(&engine::LadderStep::probability, Lt(0.99))));
   ASSERT_TRUE(ladder.unexplained.has_value());

@@ -110,24 +110,21 @@ Eigen::MatrixXd PlaceColumns(const touches::Observations& o, const ReadingsByPos
   for (int place = 0; place < period; ++place) {
     for (auto& [pose, readings] : marked)
       for (Reading& reading : readings)
-        reading.residual = Eigen::RowVectorXd::Constant(o.fingers, reading.place % period == place);
+        reading.residual = Eigen::RowVectorXd::Constant(o.fingers, reading.place == place);
     columns.col(place) = UnitsOf(o, marked).values.col(0);
   }
   return columns;
 }
 
-// Turns of `period` touches beyond those of `known`, which divides it; 1: none.
 class Turn {
  public:
   Turn(const touches::Observations& o, const std::vector<double>& residuals, const std::vector<int>& places,
-       int period, int known) {
+       int period) {
     const ReadingsByPose poses = ReadingsOf(o, residuals, places, period);
     const Units units = UnitsOf(o, poses);
     for (int place = 0; place < period; ++place)
       if (std::count(units.place.begin(), units.place.end(), place) < kMinUnitsOfPlace) return;
-    Eigen::MatrixXd base(units.known.rows(), kPoseFeatures + known);
-    base << units.known, PlaceColumns(o, poses, units, known);
-    const Eigen::MatrixXd known_basis = ColumnSpan(base).Basis();
+    const Eigen::MatrixXd known_basis = ColumnSpan(units.known).Basis();
     const auto beyond = [&](const Eigen::MatrixXd& columns) -> Eigen::MatrixXd {
       return columns - known_basis * (known_basis.transpose() * columns);
     };
@@ -173,12 +170,10 @@ std::optional<Turns> FindTurns(const touches::Observations& o, const std::vector
   if (o.fingers < 2) return std::nullopt;
   const std::vector<int> places = PlacesInSession(*o.set);
   Turns best;
-  const double enough_nats = kTurnNats + std::log(kLongestTurn - 1.0);
+  best.gain_nats = kTurnNats + std::log(kLongestTurn - 1.0);
   for (int period = 2; period <= kLongestTurn; ++period) {
-    // A multiple of a turn says the same with more values.
-    const bool multiple = best.period > 0 && period % best.period == 0;
-    const Turn turn(o, residuals, places, period, multiple ? best.period : 1);
-    if (turn.gain_nats() < (multiple ? enough_nats : std::max(best.gain_nats, enough_nats))) continue;
+    const Turn turn(o, residuals, places, period);
+    if (turn.gain_nats() <= best.gain_nats) continue;
     best.period = period;
     best.gain_nats = turn.gain_nats();
     best.p = std::min(1.0, turn.p() * (kLongestTurn - 1));

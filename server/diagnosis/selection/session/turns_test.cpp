@@ -63,7 +63,7 @@ TEST(Turns, AreNoFacesInTurn) {
   }
 }
 
-// Four places of which two and two say the same.
+// Four places of which two and two say the same, at the price of more values.
 TEST(Turns, AreNoMultipleOfTheirPeriod) {
   const auto found = TurnsOf(InTurn({0, 30e-3}, 8, 1));
   ASSERT_TRUE(found);
