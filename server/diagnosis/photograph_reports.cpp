@@ -134,6 +134,7 @@ absl::StatusOr<std::optional<report::Diagnosis>> PhotographDataErrors(const Diag
     TOUCHSTONE_ASSIGN_OR_RETURN(images::PhotographDiagnosis diagnosis,
                                 images::ComparePhotographs(input, context, expectation));
     diagnosis.verdict = engine::Verdict::kCheckData;
+    diagnosis.final = diagnosis.initial;  // the model stays as it was given
     for (const checks::PhotoMistake& mistake : mistakes)
       diagnosis.data_problems.push_back(
           WithErrors(mistake, input, diagnosis.initial ? diagnosis.initial->rmse : NAN, context.pool));

@@ -44,5 +44,24 @@ TEST(PhotographReports, CountAPictureUnderTwoNumbersOnce) {
   EXPECT_EQ(without.set_aside.count(), 0);
 }
 
+TEST(PhotographReports, GiveTheErrorOfTheGivenModelWhereAPictureIsOfTheViewBefore) {
+  images::HiddenCamera rig;
+  rig.objects = {"lat10"};
+  rig.side_px = 64;
+  rig.photographs = 9;
+  DiagnosisInput input = images::MakePhotoInput(rig);
+  auto stale = std::make_shared<session::ImageSet>(*input.images);
+  stale->photographs[4].pixels = stale->photographs[3].pixels;
+  stale->photographs[4].pixels[0] += 1;  // no copy
+  input.images = stale;
+  const absl::StatusOr<report::Diagnosis> found = Diagnose(input, DiagnosisContext());
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ(found->verdict, engine::Verdict::kCheckData);
+  ASSERT_EQ(found->data_problems.size(), 1u);
+  EXPECT_EQ(found->data_problems[0].detail, "image 4");
+  ASSERT_TRUE(found->data[0].final);
+  EXPECT_EQ(found->data[0].final->rmse, found->data[0].initial->rmse);
+}
+
 }  // namespace
 }  // namespace touchstone::diagnosis

@@ -192,6 +192,7 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   }
   // As a comparison finds it: the search leaves out outliers.
   const double compared_s = touches::Rmse(o, touches::Residuals(o, workspace->nominal));
+  const auto compared = std::count(o.used.begin(), o.used.end(), 1);
   TOUCHSTONE_ASSIGN_OR_RETURN(selection::SelectionResult selection,
                               selection::SelectExplanation(workspace.get()));
   if (!selection.group || SpeedSaysTheSame(*selection.group)) {
@@ -203,6 +204,8 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   }
   if (!gate.Enter("describing", 0.7)) return absl::CancelledError(kCancelled);
   report::Diagnosis diagnosis = BeginDiagnosis(*workspace);
+  diagnosis.data[0].set_aside.outliers =
+      static_cast<int>(compared - std::count(o.used.begin(), o.used.end(), 1));
   const std::vector<double> before = touches::Residuals(o, workspace->nominal);
   TOUCHSTONE_ASSIGN_OR_RETURN(engine::Quality quality,
                               selection::QualityOf(*workspace, selection.initial_model, before));
@@ -226,7 +229,9 @@ absl::StatusOr<report::Diagnosis> Diagnosed(const DiagnosisInput& input, int max
   }
   // An error and the floor below it are of the same touches.
   data.reducible_share = report::ReducibleShare(*data.noise_floor, assessed_s * kMicrosecondsPerSecond);
-  report::SetNothingMissing(engine::WorstOfAll(selection.tried), &diagnosis);
+  engine::NothingMissing worst = engine::WorstOfAll(selection.tried);
+  if (ladder.unexplained) worst = engine::WithRest(worst, *ladder.unexplained, ladder.set_aside.p);
+  report::SetNothingMissing(worst, &diagnosis);
   if (!gate.Enter("describing", 0.85)) return absl::CancelledError(kCancelled);
   // A part of a joint diagnosis describes what the model had left before anything was put in place.
   touches::Prediction initial = workspace->nominal;

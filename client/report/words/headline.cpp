@@ -239,8 +239,12 @@ std::string NothingMissingWords(const v1::Report& report) {
     return why.empty() ? "" : absl::StrCat("P(nothing is missing) is not assessed: ", why, ".");
   }
   const double p = report.p_nothing_missing();
+  // What is found only where sessions or kinds of measurement are compared, say.
+  constexpr double kSaysNothing = 0.05;
+  const bool beside = report.verdict() == v1::Report::UNEXPLAINED && p > kSaysNothing;
   return absl::StrCat("P(nothing is missing) ", p < 1e-15 ? "" : "= ", Probability(p), " over ",
-                      Count(report.hypotheses_tried()), " hypotheses.");
+                      Count(report.hypotheses_tried()), " hypotheses",
+                      beside ? ", of which none is what the verdict rests on." : ".");
 }
 
 std::string Headline(const v1::Report& report) {

@@ -42,9 +42,14 @@ std::string TimesTheFloor(const v1::Report& report, const v1::DataReport& data) 
   if (report.verdict() == v1::Report::TOO_LITTLE_DATA)
     return absl::StrCat(times, ", from so few ", scale.readings(), " a rough figure");
   const uint32_t aside = data.set_aside().outliers();
-  if (aside > 0)
-    return absl::StrCat(times, " with the ", Count(aside), " set aside; of the error of the others ", share,
-                        " is the model's, not noise");
+  if (aside > 0) {
+    // The share is of the others, and so is this error.
+    const double others = floor.sigma / std::sqrt(std::max(1 - data.reducible_share(), 1e-12));
+    return absl::StrCat(times, " with the ", Count(aside), " set aside; without them ",
+                        others <= 1.02 * floor.sigma ? "it is no more than the floor"
+                                                     : absl::StrCat(scale.Text(others), ", of which ", share,
+                                                                    " is the model's, not noise"));
+  }
   return absl::StrCat(times, ": ", share, " of the error is the model's, not noise");
 }
 

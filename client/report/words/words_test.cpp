@@ -117,6 +117,9 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
   report.set_p_nothing_missing(0.31);
   report.set_hypotheses_tried(214);
   EXPECT_EQ(NothingMissingWords(report), "P(nothing is missing) = 0.31 over 214 hypotheses.");
+  report.set_verdict(v1::Report::UNEXPLAINED);
+  EXPECT_EQ(NothingMissingWords(report),
+            "P(nothing is missing) = 0.31 over 214 hypotheses, of which none is what the verdict rests on.");
   EXPECT_EQ(NothingMissingWords(CheckDataReport()),
             "P(nothing is missing) is not assessed: a mistake in the data comes first.");
   EXPECT_EQ(NothingMissingWords(TooLittleDataReport()),
@@ -267,6 +270,18 @@ TEST(TimesTheFloor, BlamesTheFileWhereTheFileIsWrong) {
   EXPECT_THAT(TimesTheFloor(report, report.data(0)), Not(HasSubstr("the model's, not noise")));
   const v1::Report missing = MissingEffectsReport();
   EXPECT_THAT(TimesTheFloor(missing, missing.data(0)), HasSubstr("is the model's, not noise"));
+}
+
+TEST(TimesTheFloor, GivesErrorAndShareOfTheSameRowsWhereSomeAreSetAside) {
+  v1::Report report = MissingEffectsReport();
+  v1::DataReport& data = *report.mutable_data(0);
+  data.mutable_set_aside()->set_outliers(26);
+  data.set_reducible_share(0);
+  EXPECT_THAT(TimesTheFloor(report),
+              HasSubstr("with the 26 set aside; without them it is no more than the floor"));
+  data.set_reducible_share(0.75);
+  EXPECT_THAT(TimesTheFloor(report),
+              HasSubstr("; without them 10.0 ms, of which 75.0 % is the model's, not noise"));
 }
 
 TEST(CovariateName, IsInWords) {

@@ -169,6 +169,19 @@ NothingMissing WorstOfAll(const TriedPValues& p_values) {
   return worst;
 }
 
+NothingMissing WithFurther(NothingMissing worst, double p) {
+  // Bonferroni's inequality, by weights: as much for the one as for each of the others.
+  const double others = worst.hypotheses, all = others + 1;
+  worst.hypotheses += 1;
+  worst.p = std::min({others > 0 ? worst.p * all / others : 1, p * all, 1.0});
+  return worst;
+}
+
+NothingMissing WithRest(const NothingMissing& worst, const UnexplainedRest& rest, double p) {
+  for (const CovariateTest& test : rest.covariates) p = std::min(p, test.p);
+  return p < 1 ? WithFurther(worst, p) : worst;
+}
+
 std::optional<NothingMissing> WorstOfKinds(const std::vector<const TriedPValues*>& kinds) {
   if (kinds.empty()) return std::nullopt;
   Eigen::Index hypotheses = 0, draws = kinds[0]->cols() - 1;

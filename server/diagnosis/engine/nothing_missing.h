@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/fit/observation_model.h"
 
@@ -83,6 +84,10 @@ struct NothingMissing {
   int hypotheses = 0;
 };
 NothingMissing WorstOfAll(const TriedPValues& p_values);
+// With one more hypothesis that no draw was judged by: its p value is paid for by all that were tried.
+NothingMissing WithFurther(NothingMissing worst, double p);
+// With what a verdict of UNEXPLAINED rests on: what the rest depends on, and `p` of what shows it beside.
+NothingMissing WithRest(const NothingMissing& worst, const UnexplainedRest& rest, double p = 1);
 // Over the hypotheses of all kinds, whose noise is independent. None: a kind cannot say, or there is none.
 std::optional<NothingMissing> WorstOfKinds(const std::vector<const TriedPValues*>& kinds);
 

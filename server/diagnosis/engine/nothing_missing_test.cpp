@@ -136,6 +136,20 @@ TEST(NothingMissing, IsUniformWhereSignsOfClustersAreTurned) {
   ExpectUniform(p);
 }
 
+TEST(NothingMissing, IsAsSmallAsWhatAnUnexplainedRestRestsOn) {
+  const NothingMissing alone{0.6, 36};
+  UnexplainedRest rest;
+  EXPECT_EQ(WithRest(alone, rest).p, 0.6);
+  EXPECT_EQ(WithRest(alone, rest).hypotheses, 36);
+  rest.covariates = {{"row", 0.04, 3}, {"session_time_s", 1e-6, 12}};
+  EXPECT_NEAR(WithRest(alone, rest).p, 37e-6, 1e-9);
+  EXPECT_EQ(WithRest(alone, rest).hypotheses, 37);
+  EXPECT_NEAR(WithRest(alone, rest, 1e-9).p, 37e-9, 1e-12);
+  // One that says nothing is paid for all the same.
+  EXPECT_NEAR(WithFurther(alone, 0.9).p, 0.6 * 37 / 36, 1e-9);
+  EXPECT_EQ(WithFurther({1, 0}, 0.02).p, 0.02);
+}
+
 TEST(NothingMissing, TriesNoColumnsThatSayNothing) {
   LinearHypotheses none;
   none.Add(Eigen::MatrixXd::Zero(kReadings, 2));

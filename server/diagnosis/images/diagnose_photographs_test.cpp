@@ -284,6 +284,37 @@ TEST(DiagnosePhotographs, NamesAPoseThatDiffersFromObjectToObject) {
   EXPECT_EQ(d.steps[0].effect, "object_pose");
 }
 
+TEST(DiagnosePhotographs, NamesACameraThatWasTurnedForOneObject) {
+  HiddenCamera rig;
+  rig.photographs = 5;
+  rig.hidden_on["lat20"] = {{"camera_rotation", {"rotation_deg=0,0,0.8"}}};
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_EQ(d.verdict, engine::Verdict::kMissingEffects);
+  ASSERT_EQ(d.steps.size(), 1u);
+  EXPECT_EQ(d.steps[0].effect, "camera_rotation");
+  ASSERT_EQ(d.steps[0].parameters.size(), 3u);
+  EXPECT_EQ(d.steps[0].parameters[2].object, "lat20");
+  EXPECT_NEAR(d.steps[0].parameters[2].value, 0.8, 0.1);
+}
+
+// Where no test of single covariates sees it among so few pictures.
+TEST(DiagnosePhotographs, NamesWhatItsFormulaFollows) {
+  HiddenCamera rig;
+  rig.photographs = 5;
+  rig.unlisted = [](int photograph, int, int, const image::Photo& photo, size_t pixel) {
+    return -0.2 * photograph / 15.0 * photo.grey[pixel];
+  };
+  const PhotographDiagnosis d = Diagnosed(MakePhotoInput(rig));
+  EXPECT_EQ(d.verdict, engine::Verdict::kUnexplained);
+  ASSERT_TRUE(d.unexplained);
+  EXPECT_NE(d.unexplained->formula.find("session_time_s"), std::string::npos) << d.unexplained->formula;
+  ASSERT_FALSE(d.unexplained->covariates.empty());
+  EXPECT_EQ(d.unexplained->covariates[0].name, "session_time_s");
+  EXPECT_LT(d.unexplained->covariates[0].p, 1e-4);
+  ASSERT_TRUE(d.nothing_missing);
+  EXPECT_LT(d.nothing_missing->p, 0.01);
+}
+
 TEST(DiagnosePhotographs, GivesAnEffectOfTheModelItsRightValue) {
   TOUCHSTONE_SECOND_TIER("long: a whole diagnosis of pictures");
   HiddenCamera rig;

@@ -19,7 +19,6 @@
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMisfitRows = 1.1;  // root mean square of rows, in noise, from which a rest counts
 // Rows hardly count contours, which are point-sampled: an error so many times the floor is none of theirs.
 constexpr double kMisfitPixels = 1.2;
 constexpr double kRestP = 1e-4;
@@ -29,9 +28,8 @@ constexpr double kDoubted = 0.5;  // the most that a candidate is where no step 
 constexpr char kUnknownInWords[] =
     "Pictures differ from what is expected by more than their pixels scatter. Nothing in the catalogue "
     "explains it, "
-    "and it depends on none of what was tried: places in the picture and on the objects, brightness and "
-    "place of each "
-    "picture, contours, grey level, incidence, depth, time.";
+    "and none of what was tried takes as much as 15 % of it: places in the picture and on the objects, "
+    "brightness and place of each picture, contours, grey level, incidence, depth, time.";
 constexpr char kExposure[] = "exposure", kAlbedoOfAll[] = "the albedo of all objects";
 
 class PhotoLadder {
@@ -88,6 +86,8 @@ class PhotoLadder {
     if (selection_.steps.empty())
       for (engine::RankedCandidate& candidate : d_.candidates)
         candidate.probability = std::min(candidate.probability, kDoubted);
+    if (d_.unexplained && d_.nothing_missing)
+      d_.nothing_missing = engine::WithRest(*d_.nothing_missing, *d_.unexplained);
     engine::Conclude(found_, engine::ExplainedShare(d_.initial->rmse, d_.final->rmse, d_.noise_floor.sigma),
                      &d_);
     if (!expectations_changed) after_->clear();
@@ -167,7 +167,7 @@ class PhotoLadder {
          {P::kKindOfRest,
           [&] {
             const bool said = IsOfMeans() && !kinds.empty() && kinds[0].share > rest.heldout_gain;
-            return found_.AddIf(said, P::kKindOfRest, said ? kinds[0].words : "");
+            return found_.AddIf(said, P::kKindOfRest, said ? InWords(kinds[0]) : "");
           }},
          {P::kUnevenNoise, [&] { return AskUnevenNoise(FindUnevenNoise(judged, expected, pool_)); }},
          {P::kUnknown, [&] { return found_.AddIf(IsOfMeans(), P::kUnknown, kUnknownInWords); }}}));
@@ -180,12 +180,9 @@ class PhotoLadder {
   bool IsOfMeans() const { return found_.Leave(engine::Leaves::kMeans); }
 
   bool HasMisfit() {
-    const engine::Likelihood& likelihood = *selection_.fine.likelihood;
-    const double q = likelihood.Gram(likelihood.Prepare(fit_.columns.values.col(0)), fit_.hypothesis)(0, 0);
-    const double freedom = std::max(selection_.fine.rows->rows() - fit_.model.size(), 1);
-    const double p = ChiSquaredTail(q, freedom);
-    d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, p);
-    return (p < kRestP && std::sqrt(q / freedom) > kMisfitRows) ||
+    const RowsMisfit misfit = MisfitOfRows(selection_.fine, fit_);
+    d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, misfit.p);
+    return (misfit.p < kRestP && misfit.in_noise > kMisfitRows) ||
            d_.final->rmse > kMisfitPixels * d_.noise_floor.sigma;
   }
 
@@ -208,9 +205,11 @@ class PhotoLadder {
                        {rest->rmse, rest->heldout_rmse, d_.noise_floor.sigma}, pool_));
     if (!found) return absl::OkStatus();
     *rest = *found;
-    return found_.AddIf(true, P::kSuggestion, "", [first = found->covariate](engine::UnexplainedRest* of) {
-      std::stable_partition(of->covariates.begin(), of->covariates.end(),
-                            [&](const auto& test) { return test.name == first; });
+    return found_.AddIf(true, P::kSuggestion, "", [first = found->follows](engine::UnexplainedRest* of) {
+      const auto is_first = [&](const auto& test) { return test.name == first.name; };
+      if (!first.name.empty() && std::none_of(of->covariates.begin(), of->covariates.end(), is_first))
+        of->covariates.push_back(first);
+      std::stable_partition(of->covariates.begin(), of->covariates.end(), is_first);
     });
   }
 

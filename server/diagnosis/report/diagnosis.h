@@ -96,7 +96,7 @@ struct SetAside {
     std::vector<uint64_t> examples;  // touch numbers
   };
   std::vector<Rows> rows;
-  int outliers = 0;    // among them
+  int outliers = 0;    // among them: those that a comparison counts and the search did not
   std::string judged;  // a sentence of what outliers share, with a full stop; empty: there are none
 
   int count() const;

@@ -25,6 +25,19 @@ TEST(Summarize, BeginsWithTheErrorAndItsShareOfNoise) {
                  "model's."));
 }
 
+// A few gross errors are most of the error of all.
+TEST(Summarize, GivesErrorAndShareOfTheSameTouchesWhereSomeAreSetAside) {
+  Diagnosis diagnosis = ExampleDiagnosis(Verdict::kUnexplained);
+  DataReport& data = diagnosis.data[0];
+  data.set_aside.outliers = 26;
+  data.reducible_share = 0;
+  EXPECT_THAT(Summarize(diagnosis),
+              StartsWith("The model is off by 41 ms with the 26 set aside, and by no more than 5 ms without "
+                         "them; 5 ms is noise, so 0 % of the mean square error of those is the model's."));
+  data.reducible_share = 0.75;
+  EXPECT_THAT(Summarize(diagnosis), HasSubstr("and by 10 ms without them"));
+}
+
 TEST(Summarize, CallsAFloorWithoutRepeatsAnUpperBound) {
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kAdequate);
   diagnosis.data[0].noise_floor->from_repeats = false;
@@ -142,7 +155,12 @@ TEST(Summarize, GivesTheMistakeAndTheCommandThatFixesIt) {
   const std::string summary = Summarize(diagnosis);
   EXPECT_THAT(summary, HasSubstr("Fingers l and m are swapped."));
   EXPECT_THAT(summary, HasSubstr("touchstone session fix set.csv --swap-fingers l,m -o fixed.csv"));
-  EXPECT_THAT(summary, testing::EndsWith("lat20 has another shape."));
+  EXPECT_THAT(summary, testing::HasSubstr("lat20 has another shape. P(nothing"));
+}
+
+TEST(Summarize, SaysWhyNothingMissingIsNotAssessedOfAMistake) {
+  EXPECT_THAT(Summarize(ExampleDiagnosis(Verdict::kCheckData)),
+              HasSubstr("P(nothing is missing) is not assessed: a mistake in the data comes first."));
 }
 
 TEST(Summarize, SaysHowManyTouchesAVerdictNeeds) {

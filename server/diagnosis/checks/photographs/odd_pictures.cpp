@@ -13,13 +13,19 @@ namespace {
 
 using Mirror = session::ImageSetFix::Mirror;
 
-constexpr int kMinAll = 8;            // pictures that say what is odd
-constexpr double kMaxOddShare = 0.1;  // of the pictures; two may be odd in any case
-constexpr double kMaxMedian = 0.1;    // left of the others: the model explains them
-constexpr double kMinOddLeft = 0.12;  // left of an odd picture, at least,
-constexpr double kMinOddRatio = 8;    // ... and over the median
-constexpr double kFixedRatio = 0.3;   // left by a fix, over what was left
-constexpr double kLikeOthers = 3;     // ... or over the median
+constexpr int kMinAll = 8;              // pictures that say what is odd
+constexpr double kMaxOddShare = 0.1;    // of the pictures; two may be odd in any case
+constexpr double kMaxMedian = 0.1;      // left of the others: the model explains them
+constexpr double kMinOddLeft = 0.12;    // left of an odd picture, at least,
+constexpr double kMinOddRatio = 8;      // ... and over the median
+constexpr double kFixedRatio = 0.3;     // left by a fix, over what was left
+constexpr double kLikeOthers = 3;       // ... or over the median
+constexpr double kMaxStaleShare = 0.4;  // of the pictures: the others say what is odd
+constexpr int kMaxStaleRows = 3;        // that a view may have stood still
+
+std::string ImagesInWords(const std::vector<uint64_t>& images) {
+  return absl::StrCat(images.size() == 1 ? "image " : "images ", absl::StrJoin(images, ", "));
+}
 
 class OddSearch {
  public:
@@ -37,14 +43,14 @@ class OddSearch {
     if (median_ > kMaxMedian) return {};
     for (const TrialPicture& picture : pictures)
       if (picture.left > std::max(kMinOddLeft, kMinOddRatio * median_)) odd_.push_back(picture);
-    if (odd_.empty() ||
-        odd_.size() > std::max<size_t>(2, static_cast<size_t>(kMaxOddShare * pictures.size())))
-      return {};
+    if (odd_.empty() || odd_.size() > kMaxStaleShare * pictures.size()) return {};
+    TryStale();
+    const std::vector<TrialPicture> left_over = NotFixed();
+    if (left_over.size() > std::max<size_t>(2, static_cast<size_t>(kMaxOddShare * pictures.size())))
+      return std::move(found_);
     TryExchanges();
     TryAlone();
-    std::vector<TrialPicture> unknown;
-    for (const TrialPicture& picture : odd_)
-      if (fixed_.count(picture.row) == 0) unknown.push_back(picture);
+    const std::vector<TrialPicture> unknown = NotFixed();
     if (!unknown.empty()) AddUnknown(unknown);
     return std::move(found_);
   }
@@ -56,6 +62,47 @@ class OddSearch {
     return after < std::max(kLikeOthers * median_, kFixedRatio * before) && after < before;
   }
 
+  std::vector<TrialPicture> NotFixed() const {
+    std::vector<TrialPicture> left;
+    for (const TrialPicture& picture : odd_)
+      if (fixed_.count(picture.row) == 0) left.push_back(picture);
+    return left;
+  }
+
+  // Pictures of the view of a row before, whose own picture is as it should be: the camera gave an old one.
+  void TryStale() {
+    const auto is_odd = [&](int row) {
+      return std::any_of(odd_.begin(), odd_.end(), [&](const auto& odd) { return odd.row == row; });
+    };
+    std::vector<TrialPicture> stale;
+    OddPictures found{{}, 0, 0};
+    for (const TrialPicture& picture : odd_) {
+      int shown = picture.row - 1;
+      while (shown >= 0 && is_odd(shown) && picture.row - shown < kMaxStaleRows) --shown;
+      if (shown < 0 || is_odd(shown)) continue;
+      session::ImageSetFix at_shown;  // this picture in that row
+      at_shown.exchange = {ImageOf(picture), set_.photographs[shown].image};
+      const std::vector<TrialPicture> after = trial_.RunOn({shown}, at_shown, nullptr);
+      if (after.size() != 1 || after[0].left > kFixedRatio * picture.left) continue;
+      stale.push_back(picture);
+      fixed_.insert(picture.row);
+      found.after += after[0].left;
+    }
+    if (stale.empty()) return;
+    const double count = static_cast<double>(stale.size());
+    found.after /= count;
+    for (const TrialPicture& picture : stale) {
+      found.mistake.fix.drop.push_back(ImageOf(picture));
+      found.before += picture.left / count;
+    }
+    found.mistake.kind = ProblemKind::kStaleRows;
+    found.mistake.detail = ImagesInWords(found.mistake.fix.drop);
+    found.mistake.words = absl::StrCat(
+        found.mistake.detail, stale.size() == 1 ? " shows" : " show",
+        " the view of the row before: the camera gave an old picture (empty its buffer before each picture)");
+    found_.push_back(std::move(found));
+  }
+
   // The best exchange first, each picture once.
   void TryExchanges() {
     struct Pair {
@@ -63,26 +110,27 @@ class OddSearch {
       double after;
     };
     std::vector<Pair> pairs;
-    for (size_t a = 0; a < odd_.size(); ++a)
-      for (size_t b = a + 1; b < odd_.size(); ++b) {
+    const std::vector<TrialPicture> odd = NotFixed();
+    for (size_t a = 0; a < odd.size(); ++a)
+      for (size_t b = a + 1; b < odd.size(); ++b) {
         session::ImageSetFix fix;
-        fix.exchange = {ImageOf(odd_[a]), ImageOf(odd_[b])};
-        const std::vector<TrialPicture> after = trial_.RunOn({odd_[a].row, odd_[b].row}, fix, nullptr);
-        if (after.size() == 2 && IsFixed(odd_[a].left, after[0].left) && IsFixed(odd_[b].left, after[1].left))
+        fix.exchange = {ImageOf(odd[a]), ImageOf(odd[b])};
+        const std::vector<TrialPicture> after = trial_.RunOn({odd[a].row, odd[b].row}, fix, nullptr);
+        if (after.size() == 2 && IsFixed(odd[a].left, after[0].left) && IsFixed(odd[b].left, after[1].left))
           pairs.push_back({a, b, 0.5 * (after[0].left + after[1].left)});
       }
     std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.after < b.after; });
     for (const Pair& pair : pairs) {
-      const TrialPicture &one = odd_[pair.one], &other = odd_[pair.other];
+      const TrialPicture &one = odd[pair.one], &other = odd[pair.other];
       if (fixed_.count(one.row) > 0 || fixed_.count(other.row) > 0) continue;
       fixed_.insert({one.row, other.row});
-      OddPictures odd{{}, 0.5 * (one.left + other.left), pair.after};
-      odd.mistake.kind = ProblemKind::kExchanged;
-      odd.mistake.detail = absl::StrCat("image ", ImageOf(one), " <-> image ", ImageOf(other));
-      odd.mistake.words =
+      OddPictures exchanged{{}, 0.5 * (one.left + other.left), pair.after};
+      exchanged.mistake.kind = ProblemKind::kExchanged;
+      exchanged.mistake.detail = absl::StrCat("image ", ImageOf(one), " <-> image ", ImageOf(other));
+      exchanged.mistake.words =
           absl::StrCat("images ", ImageOf(one), " and ", ImageOf(other), " stand in each other's row");
-      odd.mistake.fix.exchange = {ImageOf(one), ImageOf(other)};
-      found_.push_back(std::move(odd));
+      exchanged.mistake.fix.exchange = {ImageOf(one), ImageOf(other)};
+      found_.push_back(std::move(exchanged));
     }
   }
 
@@ -126,8 +174,7 @@ class OddSearch {
       odd.mistake.fix.drop.push_back(ImageOf(picture));
       odd.before += picture.left / static_cast<double>(unknown.size());
     }
-    const std::string images =
-        absl::StrCat(unknown.size() == 1 ? "image " : "images ", absl::StrJoin(odd.mistake.fix.drop, ", "));
+    const std::string images = ImagesInWords(odd.mistake.fix.drop);
     odd.mistake.kind = ProblemKind::kOddPicture;
     odd.mistake.detail = images;
     odd.mistake.words = absl::StrCat(

@@ -167,6 +167,8 @@ class MistakeSearch {
               tried.mistake.kind == ProblemKind::kOddPicture
                   ? " Of the other pictures %.3g %% of the variation is unexplained (median), of it "
                     "%.3g %%."
+              : tried.mistake.kind == ProblemKind::kStaleRows
+                  ? " Compared with that row %.3g %% of their variation is unexplained instead of %.3g %%."
                   : " Then %.3g %% of the pictures' variation is unexplained instead of %.3g %%.",
               100 * tried.after, 100 * tried.before));
     told.problem.fix =

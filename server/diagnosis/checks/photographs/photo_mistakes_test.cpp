@@ -113,6 +113,22 @@ TEST(PhotoMistakes, TwoExchangedPicturesAreFound) {
   EXPECT_NE(found[0].problem.fix.find("--exchange 2,4"), std::string::npos);
 }
 
+// The camera gave the picture of the row before, and in row 9 that of two rows before: too many rows for odd ones.
+TEST(PhotoMistakes, PicturesOfTheViewBeforeAreNamed) {
+  const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
+  DiagnosisInput spoilt = input;
+  auto set = std::make_shared<session::ImageSet>(*input.images);
+  for (const auto& [row, shown] : {std::pair{3, 2}, {8, 7}, {9, 7}, {14, 13}})
+    set->photographs[row].pixels = input.images->photographs[shown].pixels;
+  spoilt.images = set;
+  const std::vector<PhotoMistake> found = Found(spoilt);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].problem.kind, ProblemKind::kStaleRows);
+  EXPECT_EQ(found[0].problem.detail, "images 3, 8, 9, 14");
+  EXPECT_NE(found[0].problem.fix.find("--drop-images 3,8,9,14"), std::string::npos) << found[0].problem.fix;
+  EXPECT_LT(found[0].left_after, 0.1 * found[0].left_before);
+}
+
 TEST(PhotoMistakes, OnePictureWithReversedUpIsFound) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   ImageSetFix one;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/base/numbers/distributions.h"
+
 namespace touchstone::diagnosis::engine {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr double kFewShare = 0.01;      // of the measurements: more are no slip
 constexpr double kSlipsShare = 0.005;   // of single slips, however far off
 constexpr double kFarAboveNoise = 1.3;  // errors over the noise, that a few gross errors do not bring about
 constexpr double kTogetherP = 1e-3;     // of standing together by chance, over all divisions
+constexpr double kBeyondNoise = 1e-4;   // of the measurements, that noise alone may set aside
 
 // Probability of at least `hits` of `drawn` measurements in a group of `group` among `all` (hypergeometric).
 double AtLeast(int hits, int drawn, int group, int all) {
@@ -27,20 +30,28 @@ double AtLeast(int hits, int drawn, int group, int all) {
   return std::min(p, 1.0);
 }
 
-// Neighbours that are both set aside: Poisson, of the mean that chance gives.
-double NeighboursP(const std::vector<char>& aside, int count) {
-  int pairs = 0;
-  for (size_t i = 1; i < aside.size(); ++i) pairs += aside[i] && aside[i - 1];
-  const double all = static_cast<double>(aside.size());
-  const double mean = count * (count - 1.0) / all;
+// Probability of `count` or more where chance gives `mean` (Poisson).
+double PoissonTail(int count, double mean) {
   double below = 0, term = std::exp(-mean);
-  for (int k = 0; k < pairs; ++k) below += term, term *= mean / (k + 1);
+  for (int k = 0; k < count; ++k) below += term, term *= mean / (k + 1);
   return std::max(1 - below, 0.0);
 }
 
-// The groups that hold more of them than chance gives, over all groups that were looked at, in words; of each division the
-// one that is least likely.
-std::string SharedGroups(const std::vector<char>& aside, const std::vector<Division>& divisions) {
+// Neighbours that are both set aside.
+double NeighboursP(const std::vector<char>& aside, int count) {
+  int pairs = 0;
+  for (size_t i = 1; i < aside.size(); ++i) pairs += aside[i] && aside[i - 1];
+  return PoissonTail(pairs, count * (count - 1.0) / static_cast<double>(aside.size()));
+}
+
+struct Shared {
+  double p = 1;  // of the least likely, over all groups that were looked at
+  std::string words;
+};
+
+// The groups that hold more of them than chance gives, over all groups that were looked at; of each division the one that is
+// least likely.
+Shared SharedGroups(const std::vector<char>& aside, const std::vector<Division>& divisions) {
   std::vector<std::pair<double, std::string>> shared;
   int looked_at = 0;
   for (const Division& division : divisions) {
@@ -61,10 +72,12 @@ std::string SharedGroups(const std::vector<char>& aside, const std::vector<Divis
     shared.push_back(std::move(best));
   }
   std::sort(shared.begin(), shared.end());
-  std::string words;
-  for (const auto& [p, group] : shared)
-    if (p * looked_at < kTogetherP) absl::StrAppend(&words, words.empty() ? "" : ", ", group);
-  return words;
+  Shared all;
+  for (const auto& [p, group] : shared) {
+    all.p = std::min(all.p, p * looked_at);
+    if (p * looked_at < kTogetherP) absl::StrAppend(&all.words, all.words.empty() ? "" : ", ", group);
+  }
+  return all;
 }
 
 }  // namespace
@@ -80,13 +93,20 @@ SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Divisi
       "%d of %d %s (%.2g %%) were set aside, since the noise of the others does not "
       "explain them",
       assessed.count, assessed.of, plural, 100 * share);
-  const std::string shared = SharedGroups(aside, divisions);
+  const Shared shared = SharedGroups(aside, divisions);
   const double neighbours_p = NeighboursP(aside, assessed.count);
   const bool single = assessed.count <= slips && share <= kSlipsShare;
-  const bool grouped = !shared.empty(), neighbours = neighbours_p < kTogetherP;
+  const bool grouped = !shared.words.empty(), neighbours = neighbours_p < kTogetherP;
   assessed.is_finding =
       share > kFewShare || grouped || neighbours || (!single && noise > 0 && rmse > kFarAboveNoise * noise);
-  absl::StrAppend(&assessed.words, grouped ? "; " + shared : "",
+  if (assessed.is_finding) {
+    const double far_off =
+        noise > 0 ? ChiSquaredTail(assessed.of * rmse * rmse / (noise * noise), assessed.of) : 1;
+    const double many = PoissonTail(assessed.count, kBeyondNoise * assessed.of);
+    constexpr int kLookedAt = 4;
+    assessed.p = std::min(kLookedAt * std::min({shared.p, neighbours_p, many, far_off}), 1.0);
+  }
+  absl::StrAppend(&assessed.words, grouped ? "; " + shared.words : "",
                   neighbours ? grouped ? ", and they follow one another" : "; they follow one another" : "",
                   !grouped && !neighbours ? "; nothing that they share was found" : "", ".");
   return assessed;

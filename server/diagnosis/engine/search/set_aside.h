@@ -18,6 +18,8 @@ struct SetAside {
   std::string words;      // a sentence for people: how many, and what they share; empty if none is set aside
   bool is_finding =
       false;  // they are no few gross errors of single readings: the model is not adequate for the data
+  double p =
+      1;  // where they are a finding: that noise alone sets so many aside, so far off or so close together
 };
 
 // `aside[i]`: measurement i, in the order in which they were made. `rmse`: of all measurements, those set aside included;

@@ -71,6 +71,12 @@ TEST(SetAside, ForbidsAnErrorFarAboveTheNoise) {
 }
 
 // By chance alone: p 0.001 for what they share and for neighbours.
+TEST(SetAside, HasASmallPWhereItIsAFinding) {
+  EXPECT_EQ(Assess({17, 302}).p, 1);
+  EXPECT_LT(Assess({10, 91, 172, 253, 334, 415, 496, 577, 658, 739, 820}).p, 1e-9);  // many
+  EXPECT_LT(Assess({17, 302}, 6.6).p, 1e-9);                                         // far off
+}
+
 TEST(SetAside, IsSeldomMistakenByChance) {
   int findings = 0;
   uint64_t state = 1;

@@ -63,7 +63,8 @@ absl::StatusOr<bool> StepwiseSearch::FallsHeldOut(const Fit& before, const Fit& 
   // Values of single objects cannot be predicted from other objects.
   const auto unseen = rare ? HeldOutRmseByBlock : HeldOutRmse;
   const double had = unseen(experiment_, before), has = unseen(experiment_, after);
-  const double kept = 1 - rules_.min_relative_cv_gain;
+  const bool far = rules_.rest_cv_gain > 0 && before.sigma > rules_.rest_sigma;
+  const double kept = 1 - (far ? rules_.rest_cv_gain : rules_.min_relative_cv_gain);
   if (!rules_.cv_gain_over_noise) return has < kept * had;
   return had * had - has * has > (1 - kept * kept) * before.sigma * before.sigma;
 }

@@ -23,6 +23,9 @@ struct SearchRules {
   // ... its square by that share of the noise's square, not of its own: where a smooth error of the surface may hold
   // most of the error that a later step explains, and the first step's share of that is nothing.
   bool cv_gain_over_noise = false;
+  // ... and where a fit leaves more than rest_sigma times the noise, by this share: what nothing explains gives way a little to
+  // every effect, and each of them would be fitted beside all others.
+  double rest_cv_gain = 0, rest_sigma = 0;
   // ... and the logarithm of a part's held-out error, of its mean over parts; 0: parts are not compared one by one.
   double min_cv_gain_std_errors = 0;
   double equivalent_nats = 3;           // explanations as near as this are named together

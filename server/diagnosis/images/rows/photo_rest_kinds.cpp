@@ -1,95 +1,26 @@
 #include "server/diagnosis/images/rows/photo_rest_kinds.h"
 
-#include <Eigen/Cholesky>
-
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
+
+#include "server/diagnosis/images/rows/rest_kind_sums.h"
+#include "server/diagnosis/images/rows/stuck_pixels.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kBlockPx = 16;   // side of a block of a picture
-constexpr int kKindFolds = 5;  // of the poses
-constexpr int kKindMapSide = 14,
-              kKindPlaceSide = 6;      // cells of a picture and of an object's box, along a side
-constexpr double kMaxFewShare = 0.1;   // of the pictures, that are a few
-constexpr double kMinFewShare = 0.5;   // of the excess, that they hold
-constexpr double kKindShrinkage = 20;  // pixels' worth of a prior at no change, of a cell
-constexpr int kPlaceColumns = 4;       // right, down, and each growing from row to row
-constexpr double kShear = 0.5;         // of a displacement, that grows from row to row: a shutter
-
-// Sums of a least-squares fit of a few columns to residuals.
-template <int kColumns>
-struct KindSums {
-  Eigen::Matrix<double, kColumns, kColumns> squares = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-  Eigen::Matrix<double, kColumns, 1> cross = Eigen::Matrix<double, kColumns, 1>::Zero();
-
-  void Add(const Eigen::Matrix<double, kColumns, 1>& column, double residual) {
-    squares += column * column.transpose();
-    cross += column * residual;
-  }
-  void Add(const KindSums& other) { squares += other.squares, cross += other.cross; }
-  void Remove(const KindSums& other) { squares -= other.squares, cross -= other.cross; }
-  Eigen::Matrix<double, kColumns, 1> Solve() const {
-    auto ridge = squares;
-    ridge.diagonal().array() += 1e-9 * squares.trace() + 1e-12;
-    return ridge.ldlt().solve(cross);
-  }
-  // Squares that these values take.
-  double Taken(const Eigen::Matrix<double, kColumns, 1>& values) const {
-    return 2 * values.dot(cross) - values.dot(squares * values);
-  }
-};
-
-// Of one cell: light that is added, and a share of the light.
-struct Cells {
-  std::vector<double> count, sum, grey_squares, grey_cross;
-  explicit Cells(size_t cells) : count(cells), sum(cells), grey_squares(cells), grey_cross(cells) {}
-  void Add(size_t cell, double grey, double residual) {
-    count[cell] += 1, sum[cell] += residual;
-    grey_squares[cell] += grey * grey, grey_cross[cell] += grey * residual;
-  }
-};
-
-// What one picture says.
-struct PictureSums {
-  std::array<KindSums<1>, 2> light;              // by half of the blocks
-  std::array<KindSums<kPlaceColumns>, 2> place;  // the same
-  KindSums<1> contours;
-  Cells in_picture{kKindMapSide * kKindMapSide}, on_object{kKindPlaceSide * kKindPlaceSide * kKindPlaceSide};
-  double squares = 0, noise = 0;  // the second: expected of noise alone
-
-  double Excess() const { return std::max(squares - noise, 0.0); }
-};
-
-// What the cells of other folds take from each fold, added light or a share of it, whichever is better.
-double TakenByCells(const std::vector<const Cells*>& pictures, const std::vector<int>& fold) {
-  if (pictures.empty()) return 0;
-  double added = 0, shared = 0;
-  for (size_t cell = 0; cell < pictures[0]->count.size(); ++cell) {
-    std::array<double, kKindFolds> count{}, sum{}, squares{}, cross{};
-    for (size_t k = 0; k < pictures.size(); ++k) {
-      count[fold[k]] += pictures[k]->count[cell], sum[fold[k]] += pictures[k]->sum[cell];
-      squares[fold[k]] += pictures[k]->grey_squares[cell], cross[fold[k]] += pictures[k]->grey_cross[cell];
-    }
-    const auto total = [](const auto& of) { return std::accumulate(of.begin(), of.end(), 0.0); };
-    const double mean_square = total(squares) / std::max(total(count), 1.0);
-    for (int f = 0; f < kKindFolds; ++f) {
-      const double value = (total(sum) - sum[f]) / (total(count) - count[f] + kKindShrinkage);
-      added += 2 * value * sum[f] - value * value * count[f];
-      const double factor =
-          (total(cross) - cross[f]) / (total(squares) - squares[f] + kKindShrinkage * mean_square + 1e-9);
-      shared += 2 * factor * cross[f] - factor * factor * squares[f];
-    }
-  }
-  return std::max(added, shared);
-}
+constexpr int kBlockPx = 16;              // side of a block of a picture
+constexpr double kMaxFewShare = 0.1;      // of the pictures, that are a few
+constexpr double kMinFewShare = 0.5;      // of the excess, that they hold
+constexpr double kMinCauseShare = 0.5;    // of the excess, that a kind takes whose cause is named
+constexpr double kMinOneObject = 0.7;     // of the excess, that the pictures of one object hold,
+constexpr double kMinOneObjectRatio = 2;  // ... over their share of the pictures
+constexpr double kShear = 0.5;            // of a displacement, that grows from row to row: a shutter
 
 class RestKinds {
  public:
@@ -107,10 +38,12 @@ class RestKinds {
   std::vector<KindOfRest> Find() const {
     std::vector<KindOfRest> kinds;
     if (!(excess_ > 0)) return kinds;
-    for (const KindOfRest& kind : {Few(), Light(), Place(), InPicture(), OnObjects(), Contours()})
+    for (const KindOfRest& kind : {Few(), Stuck(), Light(), Place(), InPicture(), OnObjects(), Contours()})
       if (kind.share >= kMinKindShare) kinds.push_back(kind);
     std::stable_sort(kinds.begin(), kinds.end(),
                      [](const auto& a, const auto& b) { return a.share > b.share; });
+    if (kinds.empty() || kinds[0].share < kMinCauseShare)
+      if (KindOfRest one = OneObject(); one.share > 0) kinds.insert(kinds.begin(), std::move(one));
     return kinds;
   }
 
@@ -173,10 +106,37 @@ class RestKinds {
     const double share = Share(held);
     const bool one = images.size() == 1;
     return {RestKind::kFewPictures, share < kMinFewShare ? 0 : share,
-            absl::StrFormat("%.0f %% of it lies in %s %s of %d: look at %s for something that covers the "
-                            "object, or for another object or pose than images.csv says.",
-                            100 * share, one ? "image" : "images", absl::StrJoin(images, ", "), p_.size(),
+            absl::StrFormat("%.0f %% of it lies in %s %s of %d.", 100 * share, one ? "image" : "images",
+                            absl::StrJoin(images, ", "), p_.size()),
+            absl::StrFormat("Look at %s for something that covers the object, or for another object or pose "
+                            "than images.csv says.",
                             one ? "it" : "them")};
+  }
+
+  KindOfRest OneObject() const {
+    std::vector<double> held(p_.objects.size(), 0.0), pictures(p_.objects.size(), 0.0);
+    for (int k = 0; k < p_.size(); ++k) held[p_.object[k]] += sums_[k].Excess(), ++pictures[p_.object[k]];
+    const size_t most = std::max_element(held.begin(), held.end()) - held.begin();
+    const double share = Share(held[most]);
+    const bool stands_out =
+        share >= kMinOneObject && share >= kMinOneObjectRatio * pictures[most] / p_.size();
+    return {RestKind::kOneObject, stands_out ? share : 0,
+            absl::StrFormat("%.0f %% of it lies in the pictures of %s (%.0f of %d).", 100 * share,
+                            p_.objects[most], pictures[most], p_.size()),
+            ""};
+  }
+
+  KindOfRest Stuck() const {
+    const StuckPixels stuck = FindStuckPixels(p_, expected_);
+    const double share = Share(stuck.excess);
+    return {RestKind::kStuckPixels, share,
+            absl::StrFormat("%s the same grey level in every picture, whatever lies there, and %.0f %% of it "
+                            "is theirs: %s.",
+                            stuck.places.size() == 1 ? "One pixel shows"
+                                                     : absl::StrCat(stuck.places.size(), " pixels show"),
+                            100 * share, PlacesInWords(stuck)),
+            "Hot or dead pixels of the camera: let it correct them, or put the mean of their neighbours in "
+            "their place."};
   }
 
   KindOfRest Light() const {
@@ -190,9 +150,10 @@ class RestKinds {
     const double share = Share(taken);
     return {RestKind::kLightOfPicture, share,
             absl::StrFormat("It differs from picture to picture: a brightness of each picture's own (%.2g %% "
-                            "root mean square) takes %.0f %% of it. The lamp flickers, or the camera chooses "
-                            "its exposure. Fix exposure and gain by hand, and photograph a grey card twice.",
-                            100 * std::sqrt(squares / p_.size()), 100 * share)};
+                            "root mean square) takes %.0f %% of it.",
+                            100 * std::sqrt(squares / p_.size()), 100 * share),
+            "The lamp flickers, or the camera chooses its exposure. Fix exposure and gain by hand, and "
+            "photograph a grey card twice."};
   }
 
   KindOfRest Place() const {
@@ -209,26 +170,27 @@ class RestKinds {
     const bool shutter = growing_px > kShear * even_px;
     return {
         RestKind::kPlaceOfPicture, share,
-        absl::StrCat(
-            absl::StrFormat(
-                "It differs from picture to picture: a displacement of each picture's own "
-                "(%.2g px%s) takes %.0f %% of it. ",
-                even_px,
-                shutter ? absl::StrFormat(", and %.2g px from the top row to the bottom one", growing_px)
-                        : "",
-                100 * share),
-            shutter ? "The camera moves while its rows are read (rolling shutter). Let the arm stand still "
-                      "before each picture."
-                    : "Poses are off by an amount of their own, or the camera moves. Photograph one pose "
-                      "several times, coming from other sides.")};
+        absl::StrFormat(
+            "It differs from picture to picture: a displacement of each picture's own (%.2g px%s) "
+            "takes %.0f %% of it.",
+            even_px,
+            shutter ? absl::StrFormat(", and %.2g px from the top row to the bottom one", growing_px) : "",
+            100 * share),
+        shutter
+            ? "The camera moves while its rows are read (rolling shutter). Let the arm stand still before "
+              "each picture."
+            : "Poses are off by an amount of their own, or the camera moves. Photograph one pose several "
+              "times, coming from other sides."};
   }
 
   KindOfRest InPicture() const {
     std::vector<const Cells*> pictures;
     for (const PictureSums& sums : sums_) pictures.push_back(&sums.in_picture);
-    return {RestKind::kInPicture, Share(TakenByCells(pictures, fold_)),
-            "Grey levels differ at the same places of every picture: dirt on the lens, a reflection, stray "
-            "light. Photograph a plain white sheet."};
+    const double share = Share(TakenByCells(pictures, fold_));
+    return {RestKind::kInPicture, share,
+            absl::StrFormat("Grey levels differ at the same places of every picture (%.0f %% of it).",
+                            100 * share),
+            "That is dirt on the lens, a reflection, or stray light. Photograph a plain white sheet."};
   }
 
   KindOfRest OnObjects() const {
@@ -243,9 +205,12 @@ class RestKinds {
       }
       taken += TakenByCells(pictures, fold);
     }
-    return {RestKind::kOnObjects, Share(taken),
-            "The light of the objects' surfaces differs by smooth patches that stay at their places: paint, "
-            "dirt, or a shape that departs from its mesh."};
+    const double share = Share(taken);
+    return {RestKind::kOnObjects, share,
+            absl::StrFormat("The light of the objects' surfaces differs by smooth patches that stay at their "
+                            "places (%.0f %% of it).",
+                            100 * share),
+            "That is paint, dirt, or a shape that departs from its mesh."};
   }
 
   KindOfRest Contours() const {
@@ -260,11 +225,16 @@ class RestKinds {
       taken += own.Taken(others.Solve());
     }
     const bool sharper = all.Solve()[0] < 0;
-    return {RestKind::kContours, Share(taken),
-            sharper ? "Contours are sharper than light can make them, with a bright and a dark line along "
-                      "them: the camera sharpens its pictures. Switch sharpening off."
-                    : "Contours are softer than expected in every picture: focus, motion, or a picture that "
-                      "was made smaller or compressed. Photograph a sharp edge."};
+    const double share = Share(taken);
+    const std::string of_it = absl::StrFormat(" (%.0f %% of it).", 100 * share);
+    return {RestKind::kContours, share,
+            absl::StrCat(sharper ? "Contours are sharper than light can make them, with a bright and a dark "
+                                   "line along them"
+                                 : "Contours are softer than expected in every picture",
+                         of_it),
+            sharper ? "The camera sharpens its pictures. Switch sharpening off."
+                    : "That is focus, motion, or a picture that was made smaller or compressed. Photograph a "
+                      "sharp edge."};
   }
 
   const Photographs& p_;
@@ -279,6 +249,11 @@ class RestKinds {
 std::vector<KindOfRest> KindsOfRest(const Photographs& photographs, const std::vector<image::Photo>& expected,
                                     ThreadPool* pool) {
   return RestKinds(photographs, expected, pool).Find();
+}
+
+std::string InWords(const KindOfRest& kind) {
+  return kind.cause.empty() || kind.share < kMinCauseShare ? kind.words
+                                                           : absl::StrCat(kind.words, " ", kind.cause);
 }
 
 double ShareOf(RestKind kind, const std::vector<KindOfRest>& kinds) {

@@ -20,19 +20,25 @@ enum class RestKind {
   kInPicture,       // at the same places of every picture
   kOnObjects,       // at the same places of the objects
   kContours,        // contours sharper or softer than expected
+  kStuckPixels,     // the same grey level at the same pixels of every picture, whatever they show
+  kOneObject,       // the pictures of one object hold most of it
 };
 
 struct KindOfRest {
   RestKind kind = RestKind::kInPicture;
   double share = 0;   // of the excess error, 0 to 1
-  std::string words;  // what is so, what may cause it, what to look at
+  std::string words;  // what is so
+  std::string cause;  // what may cause it, what to look at; may be empty
 };
 
-// The largest share first; only kinds that take kMinKindShare or more. `photographs`: with the noise of what is left;
-// `expected`: of the model, with details.
+// The largest share first; only kinds that take kMinKindShare or more. That it is one object's stands first where no other
+// kind takes half of it. `photographs`: with the noise of what is left; `expected`: of the model, with details.
 inline constexpr double kMinKindShare = 0.15;
 std::vector<KindOfRest> KindsOfRest(const Photographs& photographs, const std::vector<image::Photo>& expected,
                                     ThreadPool* pool);
+
+// What is so; what may cause it only where the kind takes half of the excess error or more.
+std::string InWords(const KindOfRest& kind);
 
 // The share of one kind; 0 where it takes less than kMinKindShare.
 double ShareOf(RestKind kind, const std::vector<KindOfRest>& kinds);

@@ -30,6 +30,7 @@ struct PhotoRowsOptions {
   int max_photographs = 40;               // that the search sees
   double contour_px2 = kUnknownPlacePx2;  // variance of a contour's place
   int max_trial_steps = 0;                // engine::SearchRules
+  int max_steps = 6;                      // the same
 };
 
 class PhotoRows : public engine::ObservationModel {

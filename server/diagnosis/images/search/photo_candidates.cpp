@@ -35,6 +35,12 @@ void AddStarts(const engine::Candidate& candidate, int fingers, std::vector<engi
   }
 }
 
+// A choice is the camera's, whatever it looks at.
+bool HasChoices(const model::Effect& effect) {
+  return std::any_of(effect.parameters.begin(), effect.parameters.end(),
+                     [](const model::ParameterInfo& parameter) { return !parameter.choices.empty(); });
+}
+
 }  // namespace
 
 std::vector<engine::Candidate> NamedOfRig(const std::vector<engine::Candidate>& candidates) {
@@ -61,9 +67,10 @@ std::vector<engine::Candidate> PhotoCandidates(const DiagnosisInput& input, cons
     candidates.push_back(candidate);
     if (candidate.nameless) continue;
     AddStarts(candidate, input.model->fingers, &candidates);
-    if (!effect->often_per_object || photographs.objects.size() < 2) continue;
+    if (photographs.objects.size() < 2 || HasChoices(*effect)) continue;
     candidate.per_object = true;
-    candidates.push_back(candidate);
+    if (effect->often_per_object) candidates.push_back(candidate);
+    // What is the camera's may have changed while one object was photographed.
     for (const std::string& object : photographs.objects) {
       candidate.object = object;
       candidate.rare = true;

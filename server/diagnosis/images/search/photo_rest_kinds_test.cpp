@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/diagnosis/images/photo_test_set.h"
+#include "server/diagnosis/images/rows/stuck_pixels.h"
 #include "server/diagnosis/images/search/photo_quality.h"
 
 namespace touchstone::diagnosis::images {
@@ -45,7 +46,47 @@ TEST(RestKinds, RowsThatAreReadLaterLieElsewhere) {
   });
   ASSERT_FALSE(kinds.empty());
   EXPECT_EQ(kinds[0].kind, RestKind::kPlaceOfPicture);
-  EXPECT_NE(kinds[0].words.find("rolling shutter"), std::string::npos) << kinds[0].words;
+  EXPECT_NE(kinds[0].cause.find("rolling shutter"), std::string::npos) << kinds[0].cause;
+}
+
+TEST(RestKinds, ACauseIsNamedOnlyOfWhatTakesHalf) {
+  const KindOfRest most = {RestKind::kLightOfPicture, 0.6, "It flickers.", "The lamp does."};
+  EXPECT_EQ(InWords(most), "It flickers. The lamp does.");
+  const KindOfRest little = {RestKind::kLightOfPicture, 0.4, "It flickers.", "The lamp does."};
+  EXPECT_EQ(InWords(little), "It flickers.");
+}
+
+// Pictures of one object, turned by 0.8 degrees: not by a shutter.
+TEST(RestKinds, WhatOneObjectHasIsNamedWhereNothingElseTakesMostOfIt) {
+  const auto kinds =
+      KindsUnder([](int photograph, int column, int row, const image::Photo& photo, size_t pixel) {
+        if (photograph < 16) return 0.0;
+        const double x = column - 79.5, y = row - 79.5, angle = 0.8 * M_PI / 180;
+        const double from_x = 79.5 + x - angle * y, from_y = 79.5 + y + angle * x;
+        const int left = std::clamp(static_cast<int>(from_x), 0, photo.width - 2);
+        const int top = std::clamp(static_cast<int>(from_y), 0, photo.height - 2);
+        const double u = from_x - left, v = from_y - top;
+        const auto grey = [&](int i, int j) -> double {
+          return photo.grey[static_cast<size_t>(j) * photo.width + i];
+        };
+        return (1 - v) * ((1 - u) * grey(left, top) + u * grey(left + 1, top)) +
+               v * ((1 - u) * grey(left, top + 1) + u * grey(left + 1, top + 1)) - photo.grey[pixel];
+      });
+  ASSERT_FALSE(kinds.empty());
+  EXPECT_EQ(kinds[0].kind, RestKind::kOneObject);
+  EXPECT_NE(kinds[0].words.find("the pictures of lat20 (8 of 24)"), std::string::npos) << kinds[0].words;
+}
+
+TEST(RestKinds, PixelsThatShowTheSameAlwaysAreCountedAndPlaced) {
+  const auto is_hot = [](int column, int row) { return column % 37 == 11 && row % 29 == 7; };
+  const auto kinds = KindsUnder([&](int, int column, int row, const image::Photo& photo, size_t pixel) {
+    return is_hot(column, row) ? 255.0 - photo.grey[pixel] : 0.0;
+  });
+  ASSERT_FALSE(kinds.empty());
+  EXPECT_EQ(kinds[0].kind, RestKind::kStuckPixels);
+  EXPECT_GT(kinds[0].share, 0.9);
+  EXPECT_NE(kinds[0].words.find("30 pixels show"), std::string::npos) << kinds[0].words;
+  EXPECT_NE(kinds[0].words.find("column 11 row 7, column 48 row 7"), std::string::npos) << kinds[0].words;
 }
 
 TEST(RestKinds, DirtLiesInThePictureAndPaintOnTheObjects) {
@@ -63,7 +104,7 @@ TEST(RestKinds, DirtLiesInThePictureAndPaintOnTheObjects) {
   });
   ASSERT_FALSE(kinds.empty());
   EXPECT_EQ(kinds[0].kind, RestKind::kOnObjects);
-  EXPECT_NE(kinds[0].words.find("paint"), std::string::npos);
+  EXPECT_NE(kinds[0].cause.find("paint"), std::string::npos);
 }
 
 TEST(RestKinds, AFewPicturesAreNamed) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/fit/held_out.h"
@@ -22,11 +23,14 @@ constexpr int kMaxTrialSteps = 2;
 constexpr double kFarSigma = 20;
 // Of that noise, the most that what kFar has found may leave: otherwise it was no displacement.
 constexpr double kFarLeaves = 0.5;
-constexpr PhotoRowsOptions kFar = {196, 3, 15, kUnknownPlacePx2, kMaxTrialSteps};
+// Displacements of several causes at once; what else is missing is found later.
+constexpr int kMaxFarSteps = 3;
+constexpr PhotoRowsOptions kFar = {196, 3, 15, kUnknownPlacePx2, kMaxTrialSteps, kMaxFarSteps};
 constexpr PhotoRowsOptions kCoarse = {1600, 2, 15, kUnknownPlacePx2, kMaxTrialSteps};
 constexpr PhotoRowsOptions kFine = {12544, 1, 30};
 constexpr int kCoarsePasses = 3;           // searches, each at what the one before has found
 constexpr double kMinDeclaredShare = 0.1;  // engine::SearchRules: gamma in the place of exposure has 0.02
+constexpr double kRestSigma = 3, kRestGain = 0.05;  // engine::SearchRules
 constexpr int kMaxRefits = 4, kMaxRareRefits = 2;
 constexpr int kAnchorPasses = 5;
 constexpr double kAnchorStays =
@@ -128,18 +132,43 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   rules.max_refits = kMaxRefits;
   rules.max_rare_refits = kMaxRareRefits;
   rules.min_declared_share = kMinDeclaredShare;
+  rules.rest_sigma = kRestSigma, rules.rest_cv_gain = kRestGain;
   rules.max_trial_steps = options.max_trial_steps;
+  rules.max_steps = options.max_steps;
   made.search = std::make_unique<engine::StepwiseSearch>(*made.experiment, candidates, rules,
                                                          [](const std::string&) {});
   return made;
 }
 
+RowsMisfit MisfitOfRows(const PhotoSearch& search, const engine::Fit& fit) {
+  const engine::Likelihood& likelihood = *search.likelihood;
+  const double q = likelihood.Gram(likelihood.Prepare(fit.columns.values.col(0)), fit.hypothesis)(0, 0);
+  const double freedom = std::max(search.rows->rows() - fit.model.size(), 1);
+  return {std::sqrt(q / freedom), ChiSquaredTail(q, freedom),
+          ChiSquaredTail(q / (kMisfitRows * kMisfitRows), freedom)};
+}
+
 namespace {
 
+// That noise alone leaves what the given model does, of rows and of pixels. Whatever is drawn by turning pictures over leaves as
+// much: of no draw is this asked.
+absl::StatusOr<double> LackOfFitP(const Photographs& photographs, const PhotoSelection& selection,
+                                  const model::Model& given, ThreadPool* pool) {
+  TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
+                              ExpectPhotographs(photographs, given, false, pool));
+  engine::Quality pixels;
+  pixels.rmse = RmseGrey(photographs, expected), pixels.lack_of_fit_p = 1;
+  AssessByPixels(photographs, NoiseFloorOfPhotographs(photographs, expected, pool), &pixels);
+  return std::min(
+      1.0, 2 * std::min(pixels.lack_of_fit_p, MisfitOfRows(selection.fine, selection.initial).p_counts));
+}
+
 // Pictures are what is independent: the pixels of one share their errors.
-absl::StatusOr<engine::TriedPValues> TryOnPictures(const PhotoSearch& search, const model::Model& given,
-                                                   uint64_t seed) {
+absl::StatusOr<engine::TriedPValues> TryOnPictures(const Photographs& photographs,
+                                                   const PhotoSelection& selection, const model::Model& given,
+                                                   uint64_t seed, ThreadPool* pool) {
   constexpr size_t kMinPictures = 8;
+  const PhotoSearch& search = selection.fine;
   const PhotoRows& rows = *search.rows;
   std::vector<int> pictures;
   for (int row = 0; row < rows.rows(); ++row)
@@ -150,7 +179,13 @@ absl::StatusOr<engine::TriedPValues> TryOnPictures(const PhotoSearch& search, co
                               engine::ColumnsOfEffects(*search.search, given));
   engine::LinearHypotheses hypotheses(0, pictures);
   hypotheses.AddEffects(rows, tried.effects);
-  return hypotheses.PValues(engine::DataAndTurned(tried.given.columns.values.col(0), pictures, seed));
+  const Eigen::MatrixXd linear =
+      hypotheses.PValues(engine::DataAndTurned(tried.given.columns.values.col(0), pictures, seed));
+  Eigen::RowVectorXd lack_of_fit = Eigen::RowVectorXd::Ones(linear.cols());
+  TOUCHSTONE_ASSIGN_OR_RETURN(lack_of_fit[0], LackOfFitP(photographs, selection, given, pool));
+  engine::TriedPValues p_values(linear.rows() + 1, linear.cols());
+  p_values << linear, lack_of_fit;
+  return p_values;
 }
 
 // The rows of the fine search. Edges that lie elsewhere than expected look like noise before; and how bright a clipped pixel
@@ -213,7 +248,8 @@ absl::StatusOr<PhotoSelection> SelectPhotoExplanation(const DiagnosisInput& inpu
   selection.fine.experiment->settled = input.settled;
   TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.5));
   TOUCHSTONE_ASSIGN_OR_RETURN(selection.initial, engine::FitModel(*selection.fine.experiment, base));
-  TOUCHSTONE_ASSIGN_OR_RETURN(selection.tried, TryOnPictures(selection.fine, *input.model, input.seed));
+  TOUCHSTONE_ASSIGN_OR_RETURN(selection.tried,
+                              TryOnPictures(photographs, selection, *input.model, input.seed, context.pool));
   TOUCHSTONE_ASSIGN_OR_RETURN(explanation, selection.fine.search->Continue(explanation));
   selection.fit = std::move(explanation.fit);
   TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.7));

@@ -103,6 +103,15 @@ absl::Status HoldChoices(PhotoSelection* selection);
 absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisContext& context,
                                PhotoSelection* selection);
 
+// What a fit leaves of the rows of its search.
+inline constexpr double kMisfitRows = 1.1;  // RowsMisfit::in_noise from which a rest counts
+struct RowsMisfit {
+  double in_noise = 0;  // root mean square
+  double p = 1;         // that noise leaves so much,
+  double p_counts = 1;  // ... and that noise kMisfitRows times as large does
+};
+RowsMisfit MisfitOfRows(const PhotoSearch& search, const engine::Fit& fit);
+
 // The covariance of the free parameters that the scatter between blocks shows, or of each value the fit's, where
 // that is larger.
 Eigen::MatrixXd CovarianceBetweenBlocks(const engine::Experiment& experiment, const engine::Fit& fit);

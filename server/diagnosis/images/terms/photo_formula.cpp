@@ -117,7 +117,7 @@ absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& 
                                 MakeCurve(kCurveAxes[axis], sums.ranges()[axis], score.values));
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<RestSuggestion> tried, search.Try(effect, score));
     if (!tried || (curve && tried->heldout_gain <= curve->heldout_gain)) continue;
-    tried->covariate = kCurveAxes[axis].name;
+    tried->follows = {kCurveAxes[axis].name, std::min(score.p * tries, 1.0), score.gain_nats - paid};
     curve = std::move(tried);
   }
   std::vector<std::pair<double, size_t>> order;  // gain beyond what is paid, term
@@ -141,7 +141,7 @@ absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& 
             std::vector<double>(score.values.data(), score.values.data() + score.values.size())));
     TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<RestSuggestion> tried, search.Try(effect, score));
     if (!tried || (formula && tried->heldout_gain <= formula->heldout_gain)) continue;
-    tried->covariate = dictionary.terms[t].covariate;
+    tried->follows = {dictionary.terms[t].covariate, std::min(score.p * tries, 1.0), order[n].first};
     formula = std::move(tried);
   }
   return formula && (!curve || formula->heldout_gain >= kFormulaOfCurve * curve->heldout_gain) ? formula

@@ -13,7 +13,7 @@
 namespace touchstone::diagnosis::images {
 
 struct RestSuggestion : engine::UnexplainedRest {  // what it says of one, and the errors with it, grey levels
-  std::string covariate;                           // that it follows
+  engine::CovariateTest follows;  // by the suggestion's own test, all that were tried paid for
 };
 
 struct RestErrors {

@@ -54,10 +54,18 @@ std::string HowWrong(const DataReport& data) {
     return absl::StrCat("The model is off by ", ErrorInWords(data.kind, rmse), ".");
   if (data.noise_floor->is_rounding && rmse <= data.noise_floor->sigma)
     return "The model agrees with the data to the rounding of files and meshes.";
+  const double floor = data.noise_floor->sigma;
+  std::string off = ErrorInWords(data.kind, rmse);
+  if (data.set_aside.outliers > 0) {
+    // The share is of the others, and so is this error.
+    const double others = floor / std::sqrt(std::max(1 - data.reducible_share, 1e-12));
+    absl::StrAppend(&off, " with the ", data.set_aside.outliers, " set aside, and by ",
+                    others > floor ? "" : "no more than ", ErrorInWords(data.kind, others), " without them");
+  }
   return absl::StrFormat(
-      "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error is the model's.",
-      ErrorInWords(data.kind, rmse), ErrorInWords(data.kind, data.noise_floor->sigma),
-      data.noise_floor->from_repeats ? "" : " at most", data.reducible_share * 100);
+      "The model is off by %s; %s is noise%s, so %.3g %% of the mean square error%s is the model's.", off,
+      ErrorInWords(data.kind, floor), data.noise_floor->from_repeats ? "" : " at most",
+      data.reducible_share * 100, data.set_aside.outliers > 0 ? " of those" : "");
 }
 
 // Repeats that scatter by more or by less than the model says. Empty: as it says.
@@ -151,6 +159,7 @@ void AddVerdict(const Diagnosis& diagnosis, bool others_in_place, std::vector<st
       for (const DataProblem& problem : diagnosis.data_problems)
         sentences->push_back(
             absl::StrCat(problem.words, problem.fix.empty() ? "" : " Fix it with: ", problem.fix));
+      sentences->push_back("P(nothing is missing) is not assessed: a mistake in the data comes first.");
       break;
     case engine::Verdict::kTooLittleData:
       sentences->push_back(absl::StrCat("That is too little for a verdict; ", Enough(data)));
