@@ -46,7 +46,7 @@ class Finder {
   }
 
   double MedianAround(int k, int x, int y) const {
-    std::array<double, 8> around;
+    std::array<double, 8> around{};
     size_t count = 0;
     for (int j = std::max(y - 1, 0); j <= std::min(y + 1, p_.height() - 1); ++j)
       for (int i = std::max(x - 1, 0); i <= std::min(x + 1, p_.width() - 1); ++i)
