@@ -26,6 +26,11 @@ std::string Size(double size, const v1::DetectableEffect& value) {
   return value.unit().empty() ? Number(size, 2) : absl::StrCat(Number(size, 2), " ", value.unit());
 }
 
+// Of a value that acts by its inverse a smaller one is found where the usual one is not.
+bool LessActsMore(const v1::DetectableEffect& value) {
+  return value.has_found_from() && value.found_from() < value.typical() && value.power_at_typical() < kPower;
+}
+
 std::string ValueName(const v1::DetectableEffect& value) {
   return value.finger().empty() ? value.parameter() : absl::StrCat(value.parameter(), " ", value.finger());
 }
@@ -110,7 +115,8 @@ void AddBlindSpots(const v1::Report& report, TextLayout* out) {
     const v1::DetectableEffect& value = *best[effect];
     if (value.power_at_typical() >= kPower) continue;
     blind.push_back(
-        value.has_found_from() ? absl::StrCat(effect, " below ", Size(value.found_from(), value))
+        value.has_found_from() ? absl::StrCat(effect, LessActsMore(value) ? " above " : " below ",
+                                              Size(value.found_from(), value))
         : value.power_at_typical() >= kMinPower
             ? absl::StrCat(effect, " for sure (", Share(value.power_at_typical()), " at the usual size)")
             : absl::StrCat(effect, " at any size"));

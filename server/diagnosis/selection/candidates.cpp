@@ -10,24 +10,11 @@ namespace {
 
 constexpr size_t kMaxObjectsVaried = 12;  // with a value each, of effects that seldom differ between objects
 
-// A ramp that ends before the first contact leaves no trace. These end a little before and after the usual travel;
-// the free parameter is 1 / acceleration.
-std::vector<double> RampStarts(const touches::Observations& o) {
-  const double speed_m_s = o.set->speed_m_s[o.row[0]], travel_m = o.set->standoff_m[o.row[0]];
-  std::vector<double> starts;
-  for (const double share : {0.7, 1.3}) starts.push_back(2 * share * travel_m / (speed_m_s * speed_m_s));
-  return starts;
-}
-
-engine::Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user,
-                                const touches::Observations& searched) {
+engine::Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user) {
   engine::Candidate candidate;
   candidate.effect = std::move(effect);
   candidate.per_object = per_object;
   candidate.of_user = of_user;
-  const std::vector<model::ParameterInfo>& parameters = candidate.effect->parameters;
-  if (!parameters.empty() && parameters.back().reciprocal && searched.size() > 0)
-    candidate.further_starts = RampStarts(searched);
   return candidate;
 }
 
@@ -41,21 +28,21 @@ std::vector<engine::Candidate> MakeCandidates(const DiagnosisInput& input,
     const bool describes_only = effect->parameters.empty();  // the entry for formulas
     if (describes_only || effect->random() || has(effect->name) || input.IsSettled(effect->name)) continue;
     if (effect->needs.session_time && !input.set->has_session_time) continue;
-    candidates.push_back(MakeCandidate(effect, effect->always_per_object, false, searched));
+    candidates.push_back(MakeCandidate(effect, effect->always_per_object, false));
     if (searched.objects.size() < 2 || effect->always_per_object) continue;
     if (effect->often_per_object || searched.objects.size() <= kMaxObjectsVaried) {
-      candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.push_back(MakeCandidate(effect, true, false));
       candidates.back().rare = !effect->often_per_object;
     }
     for (const std::string& object : searched.objects) {
-      candidates.push_back(MakeCandidate(effect, true, false, searched));
+      candidates.push_back(MakeCandidate(effect, true, false));
       candidates.back().object = object;
       candidates.back().rare = true;
     }
   }
   for (const auto& effect : input.also)
     if (!has(engine::NameOf(*effect)) && !effect->random())
-      candidates.push_back(MakeCandidate(effect, false, true, searched));
+      candidates.push_back(MakeCandidate(effect, false, true));
   return candidates;
 }
 

@@ -28,15 +28,15 @@ class Ranking {
     if (!listed_.insert({extension.name, from.per_object, extension.object}).second) return absl::OkStatus();
     const double gain_nats = extension.log_evidence - initial_.log_evidence;
     if (from.nameless) {
-      if (extension.visible) all_.push_back(gain_nats);
+      if (extension.Acts()) all_.push_back(gain_nats);
       return absl::OkStatus();
     }
     // Of those that do not act on all objects alike only the likely ones: there are many.
-    if (extension.rare && (fitted_on_one_ == kMaxFittedOnOne || !extension.visible)) return absl::OkStatus();
+    if (extension.rare && (fitted_on_one_ == kMaxFittedOnOne || !extension.Acts())) return absl::OkStatus();
     RankedCandidate& candidate = ranked_.emplace_back();
     candidate.effect = extension.name;
     candidate.scope = from.per_object ? EffectScope::kObject : EffectScope::kRig;
-    if (!extension.visible) {
+    if (!extension.Acts()) {
       candidate.note = CandidateNote::kInvisible;
       return absl::OkStatus();
     }

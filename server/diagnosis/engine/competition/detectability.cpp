@@ -12,6 +12,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/competition/expected_evidence.h"
+#include "server/diagnosis/engine/search/size_grid.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::engine {
@@ -32,7 +33,7 @@ class SizedValue {
       : parameter_(expected.extensions()[m].start.parameters()[i]) {
     const model::Effect& effect = *search.candidates()[expected.extensions()[m].candidate].effect;
     double sign = 1;
-    reach_ = ExpectedEvidence::Reach(parameter_, &sign);
+    reach_ = Reach(parameter_, &sign);
     int entry = 0;
     for (int j = 0; j < static_cast<int>(parameter_.weights.size()); ++j)
       if (std::abs(parameter_.weights[j]) > std::abs(parameter_.weights[entry])) entry = j;
@@ -99,6 +100,19 @@ class Detector {
     return step.response.norm() > kNoResponse * expected_.sigma() * std::sqrt(expected_.rows());
   }
 
+  // A size at which the rows move: *size, or the smallest on the grid. False: none.
+  absl::StatusOr<bool> FindMove(int m, int i, bool together, double* size, ExpectedStep* step) const {
+    std::vector<double> sizes = SizesOnGrid(extensions_[m].start.parameters()[i]);
+    sizes.insert(sizes.begin(), *size);
+    for (const double tried : sizes) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(*step, expected_.At(m, i, tried, together));
+      if (!Moves(*step)) continue;
+      *size = tried;
+      return true;
+    }
+    return false;
+  }
+
   // The extension that comes nearest to a response in evidence; -1: none resembles it. What its bounds keep from gaining
   // anything would have to act the other way.
   int NearestRival(int m, const ExpectedStep& step, double* correlation) const {
@@ -147,20 +161,21 @@ class Detector {
     value.entry = sized.entry();
     double size = sized.typical();
     value.typical = sized.InFile(size);
-    TOUCHSTONE_ASSIGN_OR_RETURN(ExpectedStep step, expected_.At(m, i, size, false));
-    const bool alone = Moves(step);
+    ExpectedStep step;
+    TOUCHSTONE_ASSIGN_OR_RETURN(bool alone, FindMove(m, i, false, &size, &step));
+    const bool at_typical = alone && size == sized.typical();
     if (!alone) {
       // It acts with the effect's other values only, or not at all.
-      TOUCHSTONE_ASSIGN_OR_RETURN(step, expected_.At(m, i, size, true));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool together, FindMove(m, i, true, &size, &step));
+      if (!together) return value;
     }
-    if (!Moves(step)) return value;
     const auto set_at = [&] {
       value.std_error = sized.ErrorInFile(std::sqrt(std::max(step.covariance(i, i), 0.0)), size);
       value.with_effect = std::make_shared<const model::Model>(extension.start.At(step.point));
     };
     set_at();
     if (!alone) return value;
-    value.power_at_typical = expected_.Power(m, step);
+    if (at_typical) value.power_at_typical = expected_.Power(m, step);
     const auto found_at = [&](const ExpectedStep& at) -> absl::StatusOr<double> {
       const int values = extension.start.size() - expected_.own();
       return at.ratio / NoncentralityForTail(expected_.RatioNeeded(m, at), values, kDetectionPower);
@@ -206,20 +221,29 @@ class Detector {
     return absl::OkStatus();
   }
 
-  // Changes *size until what grows as its square is 1 there. False: it is not, up to `reach`.
+  // Changes *size until what grows as its square, or in steps, is 1 there. False: it is not, up to `reach`.
   template <typename Measure>
   absl::StatusOr<bool> Grow(int m, int i, double reach, const Measure& measure, double* size,
                             ExpectedStep* e) const {
+    double below = 0, above = INFINITY;  // sizes that are too small, and large enough
     for (int step = 0; step < kMaxSteps; ++step) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const double reached, measure(*e));
       const double factor = std::clamp(1 / std::sqrt(std::max(reached, 1e-12)), 1 / kMaxGrowth, kMaxGrowth);
       if (std::abs(factor - 1) < kNear) return true;
       if (*size >= reach && factor > 1) return false;
-      *size = std::min(*size * factor, reach);
+      (factor > 1 ? below : above) = *size;
+      double next = std::min(*size * factor, reach);
+      if (below > 0 && std::isfinite(above) && (next <= below || next >= above))
+        next = std::sqrt(below * above);
+      *size = next;
       TOUCHSTONE_ASSIGN_OR_RETURN(*e, expected_.At(m, i, *size, false));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const double reached, measure(*e));
-    return reached > 1 - 2 * kNear;
+    if (reached > 1 - 2 * kNear) return true;
+    if (!std::isfinite(above)) return false;
+    *size = above;
+    TOUCHSTONE_ASSIGN_OR_RETURN(*e, expected_.At(m, i, *size, false));
+    return true;
   }
 
   const StepwiseSearch& search_;

@@ -87,6 +87,17 @@ TEST_F(DetectabilityTest, AnEffectThatMovesNoRowIsNotFound) {
   EXPECT_FALSE(push.found_from.has_value());
 }
 
+// The slope where it changes nothing says nothing of larger sizes.
+TEST_F(DetectabilityTest, AnEffectThatShowsOnlyFromASizeOnIsFoundFromThere) {
+  const double without = *Detectable()[0].found_from;
+  const double typical = Detectable()[0].typical;
+  rows.dead = 1.3 * typical * kMm;
+  const DetectableValue push = Detectable()[0];
+  EXPECT_EQ(push.power_at_typical, 0);
+  ASSERT_TRUE(push.found_from.has_value());
+  EXPECT_NEAR(*push.found_from, 1.3 * typical + without, 0.1 * typical);
+}
+
 // A column of zeros made the correlation a NaN, and what moves no row the nearest rival.
 TEST_F(DetectabilityTest, WhatMovesNoRowIsNoRival) {
   AddRival(0.5);

@@ -73,12 +73,11 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
   std::vector<TakenOver> taken;
   if (!(response.norm() > 0)) return taken;
   for (const Extension& extension : extensions) {
-    if (!extension.visible || extension.rare || extension.nameless || !extension.object.empty() ||
+    if (!extension.Acts() || extension.rare || extension.nameless || !extension.object.empty() ||
         extension.name == explained.effect)
       continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,
-                                Derivatives(experiment, extension.start, extension.start.Start(),
-                                            initial.predicted, initial.model.size()));
+                                ResponseColumns(experiment, extension, initial));
     const double share = ShareExplained(columns, response);
     const double gain_nats = extension.log_evidence - initial.log_evidence;
     // What gains nothing would have to act the other way.
@@ -110,7 +109,7 @@ absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, co
   explained.effect = effect;
   explained.in_model = extension->candidate < 0;
   explained.needed_nats = extension->rare ? search.rules().enter_rare_nats : search.rules().enter_nats;
-  explained.visible = extension->visible || extension->start.parameters().back().reciprocal;
+  explained.visible = extension->Acts();
   if (!explained.visible) return explained;
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.fit, search.FitExtension(*extension));
   const Fit& fit = *explained.fit;
@@ -122,7 +121,7 @@ absl::StatusOr<EffectExplanation> ExplainEffect(const StepwiseSearch& search, co
   // That nothing is missing, each other candidate, and this one as it was fitted.
   std::vector<double> all = {0, explained.gain_nats};
   for (const Extension& other : extensions)
-    if (other.visible && other.name != effect) all.push_back(other.log_evidence - initial.log_evidence);
+    if (other.Acts() && other.name != effect) all.push_back(other.log_evidence - initial.log_evidence);
   explained.probability = explained.changes ? ProbabilityAmong({explained.gain_nats}, all) : 0;
   TOUCHSTONE_ASSIGN_OR_RETURN(explained.taken_over, FindTakenOver(search, initial, extensions, explained));
   return explained;

@@ -73,6 +73,15 @@ TEST_F(ExplainEffectTest, AValueAtItsBoundHasTheLimitThatTheRowsExclude) {
   EXPECT_LT(push.parameters[0].upper, 2 * error_mm);
 }
 
+TEST_F(ExplainEffectTest, WhatShowsOnlyFromASizeOnIsFittedThere) {
+  rows.dead = 0.5e-3;
+  const EffectExplanation push = *Explain("object_push");
+  ASSERT_TRUE(push.visible);
+  ASSERT_EQ(push.parameters.size(), 1u);
+  EXPECT_NEAR(push.parameters[0].value, 1.5, 4 * push.parameters[0].std_error);
+  EXPECT_GT(push.gain_nats, 50);
+}
+
 TEST_F(ExplainEffectTest, WhatMovesNoRowIsNotVisible) {
   const EffectExplanation sag = *Explain("gravity_sag");
   EXPECT_FALSE(sag.visible);

@@ -8,11 +8,11 @@
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/engine/search/resemblance.h"
+#include "server/diagnosis/engine/search/size_grid.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
 
-constexpr double kMaxOverTypical = 20;  // sizes over what rigs show
 constexpr int kMaxRivalSteps = 6;       // of Gauss and Newton, to a rival's best values
 constexpr double kRivalArrived = 0.05;  // standard errors
 constexpr double kCostOfParts =
@@ -62,11 +62,6 @@ absl::StatusOr<ExpectedEvidence> ExpectedEvidence::Create(const StepwiseSearch& 
 // What noise alone adds to the residual's inner product under hypothesis s.
 double ExpectedEvidence::NoiseSquares(int s) const {
   return sigma_ * sigma_ * (likelihood().rows() - likelihood().hypotheses()[s].effective_dof);
-}
-
-double ExpectedEvidence::Reach(const FreeParameter& p, double* sign) {
-  *sign = p.upper - p.neutral >= p.neutral - p.lower ? 1 : -1;
-  return std::min(*sign > 0 ? p.upper - p.neutral : p.neutral - p.lower, kMaxOverTypical * p.scale);
 }
 
 Eigen::VectorXd ExpectedEvidence::PointAt(const Extension& extension, int i, double size,

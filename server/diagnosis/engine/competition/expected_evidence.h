@@ -40,10 +40,6 @@ class ExpectedEvidence {
   double sigma() const { return sigma_; }
   int rows() const { return likelihood().rows(); }
 
-  // The farthest that a parameter goes from where it changes nothing, and the way there: its bound, or twenty times what rigs
-  // show. Farther off, touches meet other faces, or nothing.
-  static double Reach(const FreeParameter& parameter, double* sign);
-
   // Extension m with parameter i at a size, the others where they change nothing or (`together`) at what rigs show.
   absl::StatusOr<ExpectedStep> At(int m, int i, double size, bool together) const;
   // What a search needs of that in twice the log likelihood.

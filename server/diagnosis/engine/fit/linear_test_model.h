@@ -1,6 +1,8 @@
 // For tests of the engine: rows that follow the values of effects in a way that the test chooses. No touch takes part.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -10,7 +12,8 @@
 
 namespace touchstone::diagnosis::engine {
 
-// predicted[r] = sum over the model's effects of column[r] * (v + bend * v^2), v the effect's first value, SI.
+// predicted[r] = sum over the model's effects of column[r] * (v + bend * v^2), v what the effect's first value, SI, has beyond
+// `dead`.
 class LinearTestModel : public ObservationModel {
  public:
   // `groups` x `blocks` x `repeats` rows, block by block; groups are "a", "b", ...
@@ -33,7 +36,8 @@ class LinearTestModel : public ObservationModel {
       const auto column = columns.find(instance.effect->name);
       if (column == columns.end()) continue;
       for (int r = 0; r < rows(); ++r) {
-        const double v = instance.ValuesFor(names_[GroupOfRow(r)])[0];
+        const double value = instance.ValuesFor(names_[GroupOfRow(r)])[0];
+        const double v = std::copysign(std::max(std::abs(value) - dead, 0.0), value);
         predicted[r] += column->second[r] * (v + bend * v * v);
       }
     }
@@ -58,6 +62,7 @@ class LinearTestModel : public ObservationModel {
   Eigen::VectorXd measured;
   std::map<std::string, Eigen::VectorXd> columns;  // by effect: change per SI unit of its first value
   double bend = 0;                                 // per SI unit
+  double dead = 0;                                 // SI: smaller values change nothing
 
  private:
   int rows_per_group_, repeats_;

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/search/grid_scores.h"
 #include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
@@ -292,6 +293,7 @@ absl::StatusOr<std::vector<Extension>> StepwiseSearch::Score(const Fit& fit, int
   Scorer scorer(experiment_, fit, &extensions);
   TOUCHSTONE_RETURN_IF_ERROR(scorer.Run());
   if (pairs != nullptr) *pairs = scorer.Pairs();
+  TOUCHSTONE_RETURN_IF_ERROR(ScoreOnGrid(experiment_, fit, &extensions));
   return extensions;
 }
 

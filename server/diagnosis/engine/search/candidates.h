@@ -15,8 +15,6 @@ struct Candidate {
   bool of_user = false;     // from `also`
   std::string object = {};  // the only one on which it acts; empty: on all
   bool rare = false;        // acts on one object only, or differs between objects where rigs seldom show that
-  // Values of the effect's last free parameter from where a fit starts as well: where the response is not linear.
-  std::vector<double> further_starts = {};
   // Values of the effect's free parameters from where it is scored and fitted, another place where it changes nothing
   // (the direction of a motion of length 0); empty: those that ParameterInfo::neutral gives.
   std::vector<double> starts_at = {};

@@ -74,13 +74,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, con
   const model::Effect* effect =
       extension.candidate >= 0 ? candidates_[extension.candidate].effect.get() : nullptr;
   const int size = extension.start.size();
-  if (effect != nullptr)
-    for (const double value : candidates_[extension.candidate].further_starts) {
-      Eigen::VectorXd point = extension.start.Start();
-      point[size - 1] = value;
-      starts.push_back(extension.start);
-      starts.back().MoveTo(starts.back().Clip(point));
-    }
+  if (extension.acts_at) starts.push_back(*extension.acts_at);
   if (effect != nullptr && effect->formula != nullptr && candidates_[extension.candidate].of_user) {
     // Nothing is known of a user's formula: starts all over its bounds.
     for (int k = 0; k < kFormulaStarts; ++k) {
@@ -114,7 +108,7 @@ absl::StatusOr<std::vector<StepwiseSearch::Tried>> StepwiseSearch::LikelyExtensi
   size_t rare = 0;
   for (const Extension& extension : extensions) rare += extension.rare;
   for (const Extension& extension : extensions) {
-    const bool unreached = !extension.visible && extension.start.parameters().back().reciprocal;
+    const bool unreached = extension.acts_at.has_value();
     const bool user = extension.candidate >= 0 && candidates_[extension.candidate].of_user;
     const bool near = extension.visible &&
                       (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
@@ -225,7 +219,7 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
     // A value of the model that is set free competes like any effect.
     const bool given = extension.candidate < 0;
     const bool per_object = !given && candidates_[extension.candidate].per_object;
-    if (!extension.visible) continue;
+    if (!extension.Acts()) continue;
     if (extension.name == NameOf(own) && extension.object == own_object && per_object == own_per_object)
       continue;
     const bool likely =

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,10 +52,20 @@ struct Extension {
   std::string object;       // the only one on which it acts; empty: on all
   bool rare = false;        // Candidate::rare
   bool nameless = false;    // Candidate::nameless
-  bool visible = false;     // false: this experiment cannot see it
+  bool visible = false;     // false: nothing changes near the start
   double log_evidence = 0;  // linearised prediction, nats
   Parameterization start;
+  // Where it fits best on a grid of sizes, of those at which the rows move: of an effect whose response is no line, which may
+  // show nothing near the start. None: it is not asked, or no row moves at any size.
+  std::optional<Parameterization> acts_at = {};
+
+  bool Acts() const { return visible || acts_at.has_value(); }  // false: this experiment cannot see it
 };
+
+// What an extension changes of the rows of `fit`: its derivatives at the start; of one that shows nothing there, the whole change
+// where it acts, as one column. Errors as Derivatives.
+absl::StatusOr<Eigen::MatrixXd> ResponseColumns(const Experiment& experiment, const Extension& extension,
+                                                const Fit& fit);
 
 // Two extensions at once, of those that act on all objects alike and are visible.
 struct PairOfExtensions {
@@ -96,8 +107,9 @@ class StepwiseSearch {
   // Every way to extend `fit` that is tried: candidates, values of the initial model's effects set free. Not scored yet.
   std::vector<Extension> ListExtensions(const Fit& fit, int initial_effects) const;
 
-  // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts. Of effects on one
-  // object that are far behind, only an estimate (candidate_scores.cpp).
+  // Every candidate as the only addition to `fit`, with the evidence that a linear fit predicts; where the rows do not depend on
+  // it near the start, what it predicts from the best size on a grid. Of effects on one object that are far behind, only an
+  // estimate (candidate_scores.cpp).
   // `pairs`, if given: two of them at once, best first.
   absl::StatusOr<std::vector<Extension>> Score(const Fit& fit, int initial_effects,
                                                std::vector<PairOfExtensions>* pairs = nullptr) const;

@@ -14,6 +14,7 @@ namespace {
 constexpr double kSearchSigma = 0.005;
 constexpr double kSearchColumn = 50;  // per m
 constexpr double kSearchPushM = 0.8e-3;
+constexpr double kSearchDeadM = 0.5e-3;
 
 class StepwiseSearchTest : public ::testing::Test {
  protected:
@@ -108,6 +109,25 @@ TEST_F(StepwiseSearchTest, SaysWhatTheRowsCannotSee) {
   const std::vector<Extension> extensions = *Search().Score(*FitModel(experiment, Nominal()), 0);
   EXPECT_FALSE(extensions[2].visible);
   EXPECT_TRUE(extensions[0].visible);
+}
+
+// A ramp that ends before the usual contacts: the slope where it changes nothing is zero.
+TEST_F(StepwiseSearchTest, FindsAnEffectThatShowsOnlyFromASizeOn) {
+  rows.dead = kSearchDeadM;
+  rows.measured += kSearchPushM * rows.columns["object_push"];
+  const StepwiseSearch search = Search();
+  const std::vector<Extension> extensions = *search.Score(*FitModel(experiment, Nominal()), 0);
+  EXPECT_FALSE(extensions[0].visible);
+  ASSERT_TRUE(extensions[0].Acts());
+  const Explanation explanation = *search.Run(Nominal(), 0);
+  ASSERT_EQ(Names(explanation.fit), std::vector<std::string>{"object_push"});
+  EXPECT_NEAR(explanation.fit.point[0], kSearchDeadM + kSearchPushM,
+              4 * std::sqrt(explanation.fit.covariance(0, 0)));
+}
+
+TEST_F(StepwiseSearchTest, AnEffectThatShowsOnlyFromASizeOnIsNotAddedToNoise) {
+  rows.dead = kSearchDeadM;
+  EXPECT_TRUE(Names(Search().Run(Nominal(), 0)->fit).empty());
 }
 
 TEST_F(StepwiseSearchTest, AnEffectWithTheSameColumnCompetesWithEqualEvidence) {

@@ -110,7 +110,7 @@ class LargeSteps {
     std::optional<Tried> best;
     int tried = 0;
     for (const engine::Extension& extension : extensions) {
-      if (!extension.visible || extension.candidate < 0) continue;
+      if (!extension.Acts() || extension.candidate < 0) continue;
       if (tried++ == kMaxLargeTried) break;
       Tried next;
       TOUCHSTONE_ASSIGN_OR_RETURN(next.fit, search.FitExtension(extension));
