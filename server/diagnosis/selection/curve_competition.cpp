@@ -329,7 +329,7 @@ class Competition {
 
 absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurveEffect(const NamelessCurve& curve) {
   model::LookupSpec spec;
-  spec.name = "rest_" + curve.covariate;
+  spec.name = NameOfRest(curve.covariate);
   spec.adds_time = curve.adds_time;
   spec.stage = curve.adds_time ? model::Stage::kSensor : model::Stage::kMotion;
   spec.covariate = curve.covariate;

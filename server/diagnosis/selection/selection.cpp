@@ -9,6 +9,7 @@
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/candidates.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/group_difference.h"
 #include "server/diagnosis/selection/revised_touches.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
@@ -24,11 +25,6 @@ constexpr int kMaxFormulaTerms = 2;
 constexpr int kPasses = 3;
 constexpr double kAsGoodNats =
     0.5;  // behind a fit that was extended, one that was searched anew is preferred
-
-std::string FormulaName(const FormulaTerm& term) {
-  std::string name = "rest_" + term.covariate;
-  return name.substr(0, 60);
-}
 
 // The best fit with one more term of the dictionary, if it is worth its complexity.
 struct WithTerm {
@@ -67,11 +63,11 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::Step
     if (first != nullptr) {
       // The second term joins the first in one expression.
       term = Sum(*first, candidate);
-      const int at = FindFormula(without.fit, without.initial_effects, FormulaName(*first));
+      const int at = FindFormula(without.fit, without.initial_effects, NameOfRest(first->covariate));
       if (at >= 0) base = base.Without(at);
       term.covariate = first->covariate;
     }
-    const auto effect = MakeTermEffect(FormulaName(term), term);
+    const auto effect = MakeTermEffect(NameOfRest(term.covariate), term);
     if (!effect.ok()) return effect.status();
     engine::Parameterization start = base;
     start.Add(*effect, false);
@@ -155,7 +151,7 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
     }
     if (!with.found) break;
     // From scratch, with the formula's term as one effect among the others.
-    const auto effect = MakeTermEffect(FormulaName(with.term), with.term);
+    const auto effect = MakeTermEffect(NameOfRest(with.term.covariate), with.term);
     if (!effect.ok()) return effect.status();
     engine::Parameterization start = base;
     start.Add(*effect, false);
@@ -163,7 +159,7 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
     // It may have led the search to effects that do without it.
     const bool better = again.fit.log_evidence > with.explanation.fit.log_evidence - kAsGoodNats;
     best = std::move(better ? again : with.explanation);
-    result->formula = FindFormula(best.fit, initial_effects, FormulaName(with.term));
+    result->formula = FindFormula(best.fit, initial_effects, NameOfRest(with.term.covariate));
     result->term = with.term;
     first = result->formula < 0 ? nullptr : &result->term;
   }
@@ -265,10 +261,14 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   result.tried = std::move(tried);
   result.group = std::move(group);
   if (result.memory) result.noise.sigma_s = result.memory->white_s;
-  TOUCHSTONE_RETURN_IF_ERROR(DropUnseen(*workspace, &result));
+  TOUCHSTONE_ASSIGN_OR_RETURN(const bool unseen, DropUnseen(*workspace, &result));
+  if (unseen) {
+    TOUCHSTONE_RETURN_IF_ERROR(FitCurveAnew(*workspace, &result));
+  }
   TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool dropped, DropImprobable(*workspace, &result));
   if (dropped) {
+    TOUCHSTONE_RETURN_IF_ERROR(FitCurveAnew(*workspace, &result));
     TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(&result));
   }
   if (result.formula >= 0) {

@@ -39,7 +39,8 @@ absl::Status TakeOut(const Workspace& workspace, int index, SelectionResult* res
   return Replace(workspace, index, std::move(without), result);
 }
 
-absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
+absl::StatusOr<bool> DropUnseen(const Workspace& workspace, SelectionResult* result) {
+  bool dropped = false;
   for (int index = static_cast<int>(result->fit.model.base().effects.size()) - 1;
        index >= result->initial_effects; --index) {
     if (index == result->formula) continue;
@@ -51,8 +52,9 @@ absl::Status DropUnseen(const Workspace& workspace, SelectionResult* result) {
       by_block |= HasOwnValues(result->fit, other);
     if (UnseenError(workspace, without, by_block) > UnseenError(workspace, result->fit, by_block)) continue;
     TOUCHSTONE_RETURN_IF_ERROR(Replace(workspace, index, std::move(without), result));
+    dropped = true;
   }
-  return absl::OkStatus();
+  return dropped;
 }
 
 absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult* result) {

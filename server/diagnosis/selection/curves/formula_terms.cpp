@@ -172,6 +172,10 @@ std::vector<FormulaTerm> ScoreTerms(const engine::Experiment& experiment,
   return terms;
 }
 
+std::string NameOfRest(const std::string& covariate) {
+  return ("rest_" + covariate).substr(0, 60);
+}
+
 absl::StatusOr<std::shared_ptr<const model::Effect>> MakeTermEffect(const std::string& name,
                                                                     const FormulaTerm& term) {
   model::FormulaSpec spec;

@@ -28,6 +28,9 @@ std::vector<FormulaTerm> ScoreTerms(const engine::Experiment& experiment,
                                     const touches::TouchObservationModel& touches, const engine::Fit& fit,
                                     const touches::Prediction& details);
 
+// What an effect of this covariate is called in a model, formula or curve.
+std::string NameOfRest(const std::string& covariate);
+
 // The term as an effect of this name.
 absl::StatusOr<std::shared_ptr<const model::Effect>> MakeTermEffect(const std::string& name,
                                                                     const FormulaTerm& term);

@@ -1,5 +1,7 @@
 #include "server/diagnosis/selection/ladder/climb.h"
 
+#include <algorithm>
+
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
@@ -27,9 +29,9 @@ class Climber {
   }
 
   absl::StatusOr<Climb> Run() {
-    TOUCHSTONE_RETURN_IF_ERROR(Improve());
     TOUCHSTONE_ASSIGN_OR_RETURN(
         climb_.before, QualityOfModel(workspace_, selection_.initial_model, *workspace_.input.model));
+    TOUCHSTONE_RETURN_IF_ERROR(Improve());
     TOUCHSTONE_RETURN_IF_ERROR(DescribeSteps());
     return std::move(climb_);
   }
@@ -57,7 +59,13 @@ class Climber {
         climb_.with_formula->effects.erase(climb_.with_formula->effects.begin() + index);
       TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction with,
                                   workspace_.predictor->Run(*climb_.with_formula, false, false));
-      best = touches::Residuals(o, with);
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double error_s, ErrorAsCompared(workspace_, ladder_.improved));
+      TOUCHSTONE_ASSIGN_OR_RETURN(const double error_with_s,
+                                  ErrorAsCompared(workspace_, *climb_.with_formula));
+      if (error_with_s < std::min(error_s, climb_.before.rmse))
+        best = touches::Residuals(o, with);
+      else
+        climb_.with_formula.reset();
     }
     ladder_.noise_floor = NoiseFloorOf(o, best, climb_.fit.model.size());
     AddTimeStructure(o, best, &ladder_.noise_floor);

@@ -11,8 +11,8 @@ namespace touchstone::diagnosis::selection {
 struct Climb {
   const engine::Fit* searched = nullptr;  // what is saved: without the formula, on the touches of the search
   engine::Fit fit;                        // the same on all touches
-  std::vector<engine::SelectedStep> steps;  // by the effects' indices in these fits
-  std::optional<model::Model> with_formula;
+  std::vector<engine::SelectedStep> steps;   // by the effects' indices in these fits
+  std::optional<model::Model> with_formula;  // the improved model with it; none where the error does not fall
   std::vector<double>
       residuals_with_rest;  // [k * fingers + i] of that; without a formula of the improved model
   engine::Quality before;   // of the model as it was given

@@ -13,6 +13,7 @@
 #include "server/diagnosis/engine/findings.h"
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/ladder/climb.h"
 #include "server/diagnosis/selection/ladder/doubts.h"
 #include "server/diagnosis/selection/ladder/hypotheses.h"
@@ -69,8 +70,7 @@ class LadderBuilder {
                                }));
     if (found_.Leave(engine::Leaves::kBeside)) {
       TOUCHSTONE_ASSIGN_OR_RETURN(ladder_.unexplained,
-                                  DescribeUnexplained(workspace_, selection_, ladder_.final,
-                                                      ladder_.noise_floor.sigma, climb_.with_formula));
+                                  DescribeUnexplained(workspace_, selection_, ladder_, climb_.with_formula));
       found_.DescribeRest(&*ladder_.unexplained);
     }
     engine::Conclude(found_, ExplainedShare(), &ladder_);
@@ -273,14 +273,22 @@ absl::StatusOr<Ladder> BuildLadder(const Workspace& workspace, SelectionResult* 
   for (;;) {
     TOUCHSTONE_ASSIGN_OR_RETURN(Climb climb, ClimbSteps(workspace, *selection));
     const int effect = climb.without_gain;
-    if (effect < 0) return LadderBuilder(workspace, *selection, std::move(climb)).Build();
+    if (effect < 0) {
+      if (climb.with_formula || selection->formula < 0)
+        return LadderBuilder(workspace, *selection, std::move(climb)).Build();
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool other, UseNearestFormula(workspace, selection));
+      if (!other) return LadderBuilder(workspace, *selection, std::move(climb)).Build();
+      TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(selection));
+      continue;
+    }
     // The selection's own index counts the formula's effect.
     const bool behind_formula = selection->formula >= 0 && effect >= selection->formula;
     TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, effect + behind_formula, selection));
     // What the step explained beside others is left over again.
     const bool has_rest =
         selection->formula >= 0 || selection->curve || selection->memory || selection->partial;
-    if (!has_rest) TOUCHSTONE_RETURN_IF_ERROR(CompeteWithCurves(workspace, selection));
+    TOUCHSTONE_RETURN_IF_ERROR(has_rest ? FitCurveAnew(workspace, selection)
+                                        : CompeteWithCurves(workspace, selection));
     TOUCHSTONE_RETURN_IF_ERROR(FindCompetingEffects(selection));
   }
 }

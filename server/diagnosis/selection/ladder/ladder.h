@@ -40,12 +40,12 @@ void AddMemoryStep(const NoiseMemory& memory, const touches::Observations& obser
 // Takes correlated noise out of the improved model that the given one has and the residuals rule out.
 void RemoveAbsentMemory(const touches::Observations& observations, Ladder* ladder);
 
-// What depends on which covariate where no named effect explains it, and a formula, if one was found. `final`:
-// errors after all steps, `floor_s`: of the noise; `with`: the improved model with the formula in its place; nothing: none
-// was found.
+// What depends on which covariate where no named effect explains it, and a formula or a curve, if one was found with which the
+// error falls. Of `ladder` the improved model, its errors and the noise floor; `with`: the improved model with the formula in
+// its place; nothing: there is none to suggest.
 absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                             const SelectionResult& selection,
-                                                            const engine::Quality& final, double floor_s,
+                                                            const Ladder& ladder,
                                                             std::optional<model::Model> with);
 
 }  // namespace touchstone::diagnosis::selection

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {
@@ -98,6 +99,57 @@ TEST(Ladder, AClockOfOneFingerIsNoLength) {
   EXPECT_THAT(ladder.steps, Each(Field(&engine::LadderStep::probability, Lt(0.99))));
   ASSERT_TRUE(ladder.unexplained.has_value());
   EXPECT_THAT(ladder.unexplained->formula, HasSubstr("travel_mm"));
+}
+
+// Beside a length of the finger the curve was another; the length left, and the curve stayed as it was.
+TEST(Ladder, ACurveIsFittedAnewWhereAnEffectBesideItLeaves) {
+  touches::HiddenRig rig;
+  rig.objects = {"lat10"};
+  rig.samples_per_face = 10;
+  rig.rounds = 3;
+  rig.sigma_us = 5000;
+  rig.speeds_mm_s = {10, 20, 40};
+  rig.hidden = {{"formula",
+                 {"name=release", "adds=time_us", "expression=k*(finger==-1)*(speed_mm_s/20)^2", "k=8000",
+                  "k_unit=us", "k_min=-100000", "k_max=100000"}}};
+  Selected selected = SelectFor(touches::MakeTestInput(rig));
+  const auto ladder = BuildLadder(*selected.workspace, &selected.result);
+  ASSERT_TRUE(ladder.ok()) << ladder.status();
+  ASSERT_TRUE(ladder->unexplained && ladder->unexplained->model_with);
+  EXPECT_FALSE(ladder->unexplained->lookup_yaml.empty());
+  EXPECT_LT(ladder->unexplained->rmse, 0.6 * ladder->final.rmse);
+  EXPECT_NEAR(ladder->unexplained->rmse,
+              *ErrorAsCompared(*selected.workspace, *ladder->unexplained->model_with), 1e-9);
+}
+
+// A curve that raises the error is no suggestion; the simple term of its covariate takes its place.
+TEST(Ladder, ACurveThatRaisesTheErrorGivesWayToTheNearestFormula) {
+  touches::HiddenRig rig;
+  rig.samples_per_face = 6;
+  rig.hidden = {{"lookup",
+                 {"name=wave", "adds=travel_mm", "covariate=approach_z", "knots=-1,-0.3,0,0.5,1",
+                  "l=0,0.5,-0.4,0.5,0", "m=0,0,0,0,0", "r=0,0,0,0,0"}}};
+  Selected selected = SelectFor(touches::MakeTestInput(rig));
+  ASSERT_TRUE(selected.result.curve);
+  const int at = selected.result.formula;
+  ASSERT_GE(at, 0);
+  NamelessCurve wrong = *selected.result.curve;
+  for (std::vector<double>& values : wrong.values)
+    for (double& value : values) value *= -3;
+  engine::Parameterization start = selected.result.without_formula.model;
+  start.Add(*MakeCurveEffect(wrong), false);
+  selected.result.fit = *engine::FitModel(selected.workspace->experiment, std::move(start));
+  selected.result.curve = wrong;
+  const auto ladder = BuildLadder(*selected.workspace, &selected.result);
+  ASSERT_TRUE(ladder.ok()) << ladder.status();
+  EXPECT_EQ(ladder->verdict, engine::Verdict::kUnexplained);
+  ASSERT_TRUE(ladder->unexplained.has_value());
+  EXPECT_TRUE(ladder->unexplained->lookup_yaml.empty()) << ladder->unexplained->lookup_yaml;
+  if (ladder->unexplained->model_with) {
+    EXPECT_FALSE(ladder->unexplained->formula.empty());
+    EXPECT_LT(ladder->unexplained->rmse, ladder->final.rmse);
+  }
+  EXPECT_FALSE(ladder->unexplained->covariates.empty());
 }
 
 }  // namespace

@@ -9,12 +9,12 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kNearShare = 0.5;  // of the curve's gain, for a formula that comes near it
 constexpr size_t kMaxCovariates = 6;
 constexpr double kCovariateP = 0.01;
 constexpr int kMaxSpan = 8;  // columns: effects with more of them look like anything
@@ -127,14 +127,19 @@ void AddCurves(const SelectionResult& selection, std::vector<engine::CovariateTe
 // The term of the curve's covariate that gains most, if it is worth a look, and how much of the curve's gain that is.
 void AddNearestFormula(const std::vector<FormulaTerm>& terms, const NamelessCurve& curve,
                        engine::UnexplainedRest* rest) {
-  const FormulaTerm* nearest = nullptr;
-  for (const FormulaTerm& term : terms)
-    if (term.covariate == curve.covariate && (nearest == nullptr || term.gain_nats > nearest->gain_nats))
-      nearest = &term;
-  if (nearest == nullptr || !(curve.gain_nats > 0) || nearest->gain_nats < kNearShare * curve.gain_nats)
-    return;
+  const FormulaTerm* nearest = NearestTerm(terms, curve);
+  if (nearest == nullptr) return;
   rest->nearest_formula = nearest->expression;
   rest->nearest_formula_share = std::min(1.0, nearest->gain_nats / curve.gain_nats);
+}
+
+// Whether the improved model compares better with the effect.
+absl::StatusOr<bool> LowersError(const Workspace& workspace, const Ladder& ladder,
+                                 const std::shared_ptr<const model::Effect>& effect) {
+  model::Model with = ladder.improved;
+  with.effects.push_back({effect, false, {}, {}});
+  TOUCHSTONE_ASSIGN_OR_RETURN(const double error_s, ErrorAsCompared(workspace, with));
+  return error_s < ladder.final.rmse;
 }
 
 // What of the catalogue looks most like the formula.
@@ -155,10 +160,9 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<engine::Extension> extensions,
                               selection.search->Score(without, selection.initial_effects));
   for (const engine::Extension& extension : extensions) {
-    if (extension.candidate < 0 || !extension.visible || !extension.object.empty()) continue;
+    if (extension.candidate < 0 || !extension.Acts() || !extension.object.empty()) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
-                                engine::Derivatives(workspace.experiment, extension.start,
-                                                    extension.start.Start(), without.predicted, own));
+                                engine::ResponseColumns(workspace.experiment, extension, without));
     if (span.cols() > kMaxSpan) continue;
     const double cosine = Cosine(others, column, span);
     if (cosine <= rest->nearest_cosine) continue;
@@ -172,7 +176,7 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
 
 absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& workspace,
                                                             const SelectionResult& selection,
-                                                            const engine::Quality& final, double floor_s,
+                                                            const Ladder& ladder,
                                                             std::optional<model::Model> with) {
   std::vector<FormulaTerm> terms = selection.terms;
   if (terms.empty()) {
@@ -180,26 +184,28 @@ absl::StatusOr<engine::UnexplainedRest> DescribeUnexplained(const Workspace& wor
                                 workspace.searched_predictor->Run(selection.fit.model.base(), true, true));
     terms = ScoreTerms(workspace.experiment, *workspace.rows, selection.fit, details);
   }
-  const bool has_formula = selection.formula >= 0;
   engine::UnexplainedRest rest;
   rest.model_with = std::move(with);
-  rest.covariates = TestCovariates(terms, has_formula ? selection.term.covariate : "");
+  rest.covariates = TestCovariates(terms, selection.formula >= 0 ? selection.term.covariate : "");
   AddCurves(selection, &rest.covariates);
+  const bool is_curve = selection.formula >= 0 &&
+                        selection.fit.model.base().effects[selection.formula].effect->lookup != nullptr;
   if (selection.curve) {
     const auto effect = MakeCurveEffect(*selection.curve);
-    if (effect.ok()) {
+    bool helps = effect.ok();
+    if (helps && is_curve) helps = rest.model_with.has_value();
+    if (helps && !is_curve) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(helps, LowersError(workspace, ladder, *effect));
+    }
+    if (helps) {
       rest.lookup_yaml = engine::EffectYaml(selection.fit.model.base(), {*effect, false, {}, {}});
       rest.lookup = *effect;
       AddNearestFormula(terms, *selection.curve, &rest);
     }
   }
-  if (!has_formula) return rest;
-  if (selection.fit.model.base().effects[selection.formula].effect->lookup != nullptr) {
-    TOUCHSTONE_RETURN_IF_ERROR(DescribeCurve(workspace, selection, final, floor_s, &rest));
-    TOUCHSTONE_RETURN_IF_ERROR(FindNearestEffect(workspace, selection, &rest));
-    return rest;
-  }
-  TOUCHSTONE_RETURN_IF_ERROR(DescribeFormula(workspace, selection, final, floor_s, &rest));
+  if (!rest.model_with) return rest;
+  const auto describe = is_curve ? DescribeCurve : DescribeFormula;
+  TOUCHSTONE_RETURN_IF_ERROR(describe(workspace, selection, ladder.final, ladder.noise_floor.sigma, &rest));
   TOUCHSTONE_RETURN_IF_ERROR(FindNearestEffect(workspace, selection, &rest));
   return rest;
 }
