@@ -11,6 +11,9 @@
 namespace touchstone::diagnosis::engine {
 namespace {
 
+constexpr double kDoubtful = 0.5;  // a step that is less probable is rather none
+constexpr double kGainOfDoubtful =
+    0.003;                    // of the error on unseen parts, which it must let fall by this share
 constexpr int kMaxFits = 80;  // of one search for an order; six steps need 21 where the first order does
 
 // The model with only those of its further effects that are in `kept`.
@@ -101,7 +104,7 @@ class Orderer {
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto next, Next(kept));
     for (const auto& [step, with] : next) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality, QualityOf(*step, with, last));
-      if (!Falls(last, quality)) continue;
+      if (!Falls(last, quality, *step)) continue;
       chosen_.emplace_back(step, with);
       TOUCHSTONE_ASSIGN_OR_RETURN(const bool done, Extend(with, quality));
       if (done) return true;
@@ -119,7 +122,7 @@ class Orderer {
       TOUCHSTONE_ASSIGN_OR_RETURN(const auto next, Next(kept));
       kept = next[0].second;
       TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality, QualityOf(*next[0].first, kept, last));
-      if (!Falls(last, quality)) {
+      if (!Falls(last, quality, *next[0].first)) {
         chosen_.clear();
         return next[0].first;
       }
@@ -142,7 +145,7 @@ class Orderer {
     const Quality anything = {INFINITY, INFINITY, 0};
     TOUCHSTONE_ASSIGN_OR_RETURN(const Quality without, QualityOf(other, AllBut(step.effect), anything));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Quality with, QualityOf(step, AllBut(-1), anything));
-    return Falls(without, with);
+    return Falls(without, with, step);
   }
 
   // The effect without which the others explain most; one that has no gain after them, if there is any.
@@ -173,8 +176,9 @@ class Orderer {
 
 }  // namespace
 
-bool Falls(const Quality& before, const Quality& after) {
-  return after.rmse < before.rmse && after.heldout_rmse < before.heldout_rmse;
+bool Falls(const Quality& before, const Quality& after, const SelectedStep& step) {
+  const double kept = step.probability < kDoubtful ? 1 - kGainOfDoubtful : 1;
+  return after.rmse < before.rmse && after.heldout_rmse < kept * before.heldout_rmse;
 }
 
 absl::StatusOr<StepOrder> OrderSteps(const Experiment& experiment, const Explanation& whole, int nameless,

@@ -32,8 +32,9 @@ struct StepOrder {
   int without_gain = -1;
 };
 
-// Whether the error of the fit, and that on parts that it did not see, falls: otherwise a step is none.
-bool Falls(const Quality& before, const Quality& after);
+// Whether the error of the fit, and that on parts that it did not see, falls with the step: otherwise it is none. With one that is
+// rather none by its probability, the second must fall by as much as a search asks of a step.
+bool Falls(const Quality& before, const Quality& after, const SelectedStep& step);
 
 // The steps in the order in which they explain most, as far as the error falls with each: a step may need one that explains
 // less by itself, as a tip's radius may need the right spacing of the fingers. Each is fitted with those before it; the last

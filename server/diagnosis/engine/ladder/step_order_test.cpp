@@ -31,6 +31,7 @@ class StepOrderTest : public ::testing::Test {
       start.Add(effects::Catalogue().Find(effect), false);
       SelectedStep& step = steps.emplace_back();
       step.effect = static_cast<int>(steps.size()) - 1;
+      step.probability = 0.9;
     }
     likelihood = std::make_unique<Likelihood>(rows.GroupRows(), nullptr, 0, nullptr);
     experiment.observations = &rows;
@@ -103,9 +104,16 @@ TEST_F(StepOrderTest, WhereEachHasGainAfterTheOthersTheWeakestIsTakenOut) {
 }
 
 TEST_F(StepOrderTest, LowerErrorOfTheFitAloneIsNoGain) {
-  EXPECT_TRUE(Falls(kAsGiven, {9, 9, 0}));
-  EXPECT_FALSE(Falls(kAsGiven, {9, 10, 0}));
-  EXPECT_FALSE(Falls(kAsGiven, {10, 9, 0}));
+  EXPECT_TRUE(Falls(kAsGiven, {9, 9, 0}, steps[0]));
+  EXPECT_FALSE(Falls(kAsGiven, {9, 10, 0}, steps[0]));
+  EXPECT_FALSE(Falls(kAsGiven, {10, 9, 0}, steps[0]));
+}
+
+TEST_F(StepOrderTest, AnImprobableStepNeedsTheGainThatASearchAsksFor) {
+  EXPECT_TRUE(Falls(kAsGiven, {9.98, 9.98, 0}, steps[0]));
+  steps[0].probability = 0.13;
+  EXPECT_FALSE(Falls(kAsGiven, {9.98, 9.98, 0}, steps[0]));
+  EXPECT_TRUE(Falls(kAsGiven, {9.9, 9.9, 0}, steps[0]));
 }
 
 }  // namespace
