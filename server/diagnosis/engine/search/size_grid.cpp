@@ -14,7 +14,8 @@ constexpr double kGridFactor = 1.5;
 
 double Reach(const FreeParameter& p, double* sign) {
   *sign = p.upper - p.neutral >= p.neutral - p.lower ? 1 : -1;
-  return std::min(*sign > 0 ? p.upper - p.neutral : p.neutral - p.lower, kMaxOverTypical * p.scale);
+  const double bound = *sign > 0 ? p.upper - p.neutral : p.neutral - p.lower;
+  return p.reciprocal ? bound : std::min(bound, kMaxOverTypical * p.scale);
 }
 
 std::vector<double> SizesOnGrid(const FreeParameter& parameter) {

@@ -9,7 +9,7 @@
 namespace touchstone::diagnosis::engine {
 
 // The farthest that a parameter goes from where it changes nothing, and the way there: its bound, or twenty times what rigs
-// show. Farther off, touches meet other faces, or nothing.
+// show: farther off, touches meet other faces, or nothing. A value that acts by its inverse moves no contact, and has its bound alone.
 double Reach(const FreeParameter& parameter, double* sign);
 
 // Distances from where the parameter changes nothing, rising by a constant factor; the last is Reach.
