@@ -38,7 +38,8 @@ std::string ProblemTitle(const v1::DataProblem& problem) {
       {v1::DataProblem::WRONG_OBJECT, "another object"},
       {v1::DataProblem::FOCAL_FACTOR, "another focal length"},
       {v1::DataProblem::EXCHANGED, "pictures exchanged"},
-      {v1::DataProblem::ODD_PICTURE, "pictures of something else"}};
+      {v1::DataProblem::ODD_PICTURE, "pictures of something else"},
+      {v1::DataProblem::SATURATED_TIMES, "times cut off at a largest one"}};
   const auto title = kTitles.find(problem.kind());
   return absl::StrCat(title == kTitles.end() ? "a mistake in the file" : title->second,
                       problem.detail().empty() ? "" : absl::StrCat(" (", problem.detail(), ")"));

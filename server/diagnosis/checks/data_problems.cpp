@@ -18,6 +18,7 @@
 #include "server/diagnosis/checks/part_mistakes.h"
 #include "server/diagnosis/checks/rows/duplicates.h"
 #include "server/diagnosis/checks/rows/round_speed.h"
+#include "server/diagnosis/checks/rows/saturated_times.h"
 #include "server/diagnosis/checks/rows/stale_rows.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/sorted_column.h"
@@ -96,6 +97,7 @@ class ProblemList {
   void AddMeshUnit(const MeshUnit& wrong);
   void AddDuplicates(const touches::Observations& o);
   void AddStaleRows();
+  void AddSaturatedTimes(const touches::Observations& o);
   void AddRoundSpeed(const touches::Observations& o);
   void AddSortedColumn(const TrialResult& before);
 
@@ -191,6 +193,37 @@ void ProblemList::AddStaleRows() {
            "them the model as it is would be off by %s instead of %s.",
            stale.rows, set.size(), set.touch[stale.example], TimeInWords(after_s), TimeInWords(BeforeS())),
        TouchFixCommand(fix, set), BeforeS(), after_s});
+}
+
+void ProblemList::AddSaturatedTimes(const touches::Observations& o) {
+  const absl::StatusOr<touches::Prediction> expected =
+      touches::Predict(o, *input_.model, false, false, pool_);
+  if (!expected.ok()) return;
+  const SaturatedTimes found = FindSaturatedTimes(o, *expected);
+  if (found.fingers.empty()) return;
+  auto set = std::make_shared<session::MeasurementSet>(*input_.set);
+  for (const size_t reading : found.readings) set->time_s[reading] = NAN;
+  DiagnosisInput without = input_;
+  without.set = set;
+  const double after_s = RmseOf(without, pool_);
+  std::vector<std::string> names;
+  for (const int finger : found.fingers) names.push_back(model::FingerName(finger, set->fingers));
+  const std::string time = absl::StrFormat("%.0f us", FromSi(Unit::kMicrosecond, found.time_s));
+  const bool all = static_cast<int>(names.size()) == set->fingers;
+  problems_.push_back(
+      {ProblemKind::kSaturatedTimes,
+       absl::StrCat(found.touches, " of ", set->size(), " touches at ", time, all ? "" : " of finger ",
+                    all ? "" : absl::StrJoin(names, ", ")),
+       absl::StrFormat(
+           "%d of %d touches share the largest time %s, %s (the first is touch %d), and the model expects "
+           "nearly "
+           "all of them later: the times are cut off there, by a counter that stops, a time-out, or the "
+           "file. "
+           "Record them again with a longer range, or leave those times empty, as contacts that were missed. "
+           "Without them the model as it is would be off by %s instead of %s.",
+           found.touches, set->size(), all ? "of any finger" : "of finger " + absl::StrJoin(names, " and "),
+           time, set->touch[found.example], TimeInWords(after_s), TimeInWords(BeforeS())),
+       "", BeforeS(), after_s});
 }
 
 void ProblemList::AddRoundSpeed(const touches::Observations& o) {
@@ -313,6 +346,8 @@ absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const Diagnosi
   ProblemList problems(input, context.pool);
   // Whatever else the file seems to have may be these rows.
   problems.AddStaleRows();
+  if (!problems.empty()) return problems.Take();
+  problems.AddSaturatedTimes(*o);
   if (!problems.empty()) return problems.Take();
   if (!NothingToExplain(*before)) {
     const absl::Status looked = LookForMistakes(input, context, trial, *before, &problems);

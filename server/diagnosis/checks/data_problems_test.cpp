@@ -225,6 +225,39 @@ TEST(DataProblems, RowsThatHoldTheTimesOfTheRowBeforeAreTold) {
   }
 }
 
+// The file with every time that is later than `limit_s` after the first cut off there; of one finger, or (-1) of all.
+DiagnosisInput CutOff(const DiagnosisInput& right, double limit_s, int finger) {
+  return Spoilt(right, [&](MeasurementSet* set) {
+    for (int row = 0; row < set->size(); ++row) {
+      double* times_s = &set->time_s[row * 3];
+      const double first_s = std::min({times_s[0], times_s[1], times_s[2]});
+      for (int i = 0; i < 3; ++i)
+        if (finger < 0 || i == finger) times_s[i] = std::min(times_s[i], first_s + limit_s);
+    }
+  });
+}
+
+TEST(DataProblems, TimesThatAreCutOffAtALargestOneAreTold) {
+  for (const int finger : {-1, 2}) {
+    const auto problems = ProblemsOf(CutOff(MakeFile(Rig()), 0.3, finger));
+    ASSERT_EQ(problems.size(), 1u) << finger;
+    EXPECT_EQ(problems[0].kind, ProblemKind::kSaturatedTimes);
+    EXPECT_THAT(problems[0].words, ::testing::HasSubstr(finger < 0 ? "300000 us" : "of finger r"));
+    EXPECT_LT(problems[0].error_after, 0.5 * problems[0].error_before);
+  }
+}
+
+TEST(DataProblems, TicksMissedContactsAndRepeatsAreNotTakenForTimesThatAreCutOff) {
+  EXPECT_TRUE(ProblemsOf(WithTicks(0.1, 1)).empty());
+  EXPECT_TRUE(ProblemsOf(WithTicks(0.02, 1)).empty());
+  EXPECT_TRUE(ProblemsOf(Spoilt(MakeFile(Rig()), [](MeasurementSet* set) {
+                for (int row = 0; row < set->size(); ++row)
+                  for (int i = 0; i < 3; ++i)
+                    if (set->time_s[row * 3 + i] > set->time_s[row * 3 + (i + 1) % 3] + 0.3)
+                      set->time_s[row * 3 + i] = NAN;
+              })).empty());
+}
+
 TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
   touches::HiddenRig rig = Rig();
   rig.rounds = 4;

@@ -152,6 +152,8 @@ enum class ProblemKind {
   kFocalFactor,
   kExchanged,
   kOddPicture,
+  // Of touches.
+  kSaturatedTimes,
 };
 
 // A discrete mistake in a measurement file, and how to fix it.

@@ -32,7 +32,8 @@ void WriteStep(const Step& step, v1::Step* message) {
 }
 
 v1::DataProblem::Kind KindMessage(engine::ProblemKind kind) {
-  static_assert(static_cast<int>(engine::ProblemKind::kOddPicture) + 1 == v1::DataProblem::ODD_PICTURE);
+  static_assert(static_cast<int>(engine::ProblemKind::kSaturatedTimes) + 1 ==
+                v1::DataProblem::SATURATED_TIMES);
   return static_cast<v1::DataProblem::Kind>(static_cast<int>(kind) + 1);
 }
 

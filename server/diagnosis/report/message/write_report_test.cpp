@@ -241,10 +241,13 @@ TEST(ToReport, HasTheMistakeInTheFileAndItsFix) {
 TEST(ToReport, NamesEveryKindOfMistakeByItsName) {
   using engine::ProblemKind;
   Diagnosis diagnosis = ExampleDiagnosis(Verdict::kCheckData);
-  const std::pair<ProblemKind, const char*> kinds[] = {
-      {ProblemKind::kFingerOrder, "FINGER_ORDER"}, {ProblemKind::kFrame, "FRAME"},
-      {ProblemKind::kDuplicates, "DUPLICATES"},    {ProblemKind::kStaleRows, "STALE_ROWS"},
-      {ProblemKind::kMirrored, "MIRRORED"},        {ProblemKind::kWrongObject, "WRONG_OBJECT"}};
+  const std::pair<ProblemKind, const char*> kinds[] = {{ProblemKind::kFingerOrder, "FINGER_ORDER"},
+                                                       {ProblemKind::kFrame, "FRAME"},
+                                                       {ProblemKind::kDuplicates, "DUPLICATES"},
+                                                       {ProblemKind::kStaleRows, "STALE_ROWS"},
+                                                       {ProblemKind::kMirrored, "MIRRORED"},
+                                                       {ProblemKind::kWrongObject, "WRONG_OBJECT"},
+                                                       {ProblemKind::kSaturatedTimes, "SATURATED_TIMES"}};
   for (const auto& [kind, name] : kinds) {
     diagnosis.data_problems = {{kind, "", "", "", 0, 0}};
     EXPECT_EQ(v1::DataProblem::Kind_Name(ToReport(diagnosis).data_problems(0).kind()), name);
