@@ -277,10 +277,10 @@ TEST(TimesTheFloor, GivesErrorAndShareOfTheSameRowsWhereSomeAreSetAside) {
   v1::DataReport& data = *report.mutable_data(0);
   data.mutable_set_aside()->set_outliers(26);
   data.set_reducible_share(0);
-  EXPECT_THAT(TimesTheFloor(report),
+  EXPECT_THAT(TimesTheFloor(report, report.data(0)),
               HasSubstr("with the 26 set aside; without them it is no more than the floor"));
   data.set_reducible_share(0.75);
-  EXPECT_THAT(TimesTheFloor(report),
+  EXPECT_THAT(TimesTheFloor(report, report.data(0)),
               HasSubstr("; without them 10.0 ms, of which 75.0 % is the model's, not noise"));
 }
 
