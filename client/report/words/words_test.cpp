@@ -281,7 +281,7 @@ TEST(TimesTheFloor, GivesErrorAndShareOfTheSameRowsWhereSomeAreSetAside) {
               HasSubstr("with the 26 set aside; without them it is no more than the floor"));
   data.set_reducible_share(0.75);
   EXPECT_THAT(TimesTheFloor(report, report.data(0)),
-              HasSubstr("; without them 10.0 ms, of which 75.0 % is the model's, not noise"));
+              HasSubstr("; without them 10.0 ms, of which 75 % is the model's, not noise"));
 }
 
 TEST(CovariateName, IsInWords) {
