@@ -36,9 +36,9 @@ struct NamelessRival {
 };
 
 struct SelectedStep {
-  int effect = 0;                          // index in the fit's model
-  double gain_nats = 0;                    // over the fit without it
-  double probability = 0;                  // with its equivalents, among all that could take its place
+  int effect = 0;          // index in the fit's model
+  double gain_nats = 0;    // over the fit without it
+  double probability = 1;  // with its equivalents, among all that could take its place; 1: not assessed
   std::vector<CompetingEffect> competing;  // best first
   std::string words;                       // what has no name and says nearly the same; empty: nothing does
 };

@@ -114,6 +114,7 @@ TEST_F(StepOrderTest, AnImprobableStepNeedsTheGainThatASearchAsksFor) {
   steps[0].probability = 0.13;
   EXPECT_FALSE(Falls(kAsGiven, {9.98, 9.98, 0}, steps[0]));
   EXPECT_TRUE(Falls(kAsGiven, {9.9, 9.9, 0}, steps[0]));
+  EXPECT_TRUE(Falls(kAsGiven, {9.98, 9.98, 0}, SelectedStep()));  // of photographs: not assessed by then
 }
 
 }  // namespace
