@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <new>
 
 #include "server/base/status.h"
 
@@ -18,7 +19,13 @@ constexpr size_t kBufferBytes = 1 << 20;
 }  // namespace
 
 struct SyncedFile::Hash {
-  Hash() : context(EVP_MD_CTX_new()) { EVP_DigestInit_ex(context, EVP_sha256(), nullptr); }
+  Hash() : context(EVP_MD_CTX_new()) {
+    // OpenSSL takes its memory without new, and fails where there is none.
+    if (context == nullptr || EVP_DigestInit_ex(context, EVP_sha256(), nullptr) != 1) {
+      EVP_MD_CTX_free(context);
+      throw std::bad_alloc();
+    }
+  }
   ~Hash() { EVP_MD_CTX_free(context); }
   std::string Hex() {
     unsigned char bytes[EVP_MAX_MD_SIZE];

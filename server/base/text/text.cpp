@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <new>
 
 #include "server/base/status.h"
 
@@ -41,7 +42,9 @@ using Digest = std::unique_ptr<EVP_MD_CTX, DigestDeleter>;
 
 Digest NewSha256() {
   Digest digest(EVP_MD_CTX_new());
-  EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr);
+  // OpenSSL takes its memory without new, and fails where there is none.
+  if (digest == nullptr || EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr) != 1)
+    throw std::bad_alloc();
   return digest;
 }
 
