@@ -2,12 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
-#include <openssl/evp.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
-#include <new>
 
 #include "server/base/status.h"
 
@@ -17,26 +15,6 @@ namespace {
 constexpr size_t kBufferBytes = 1 << 20;
 
 }  // namespace
-
-struct SyncedFile::Hash {
-  Hash() : context(EVP_MD_CTX_new()) {
-    // OpenSSL takes its memory without new, and fails where there is none.
-    if (context == nullptr || EVP_DigestInit_ex(context, EVP_sha256(), nullptr) != 1) {
-      EVP_MD_CTX_free(context);
-      throw std::bad_alloc();
-    }
-  }
-  ~Hash() { EVP_MD_CTX_free(context); }
-  std::string Hex() {
-    unsigned char bytes[EVP_MAX_MD_SIZE];
-    unsigned int size = 0;
-    EVP_DigestFinal_ex(context, bytes, &size);
-    std::string hex;
-    for (unsigned int i = 0; i < size; ++i) absl::StrAppend(&hex, absl::Hex(bytes[i], absl::kZeroPad2));
-    return hex;
-  }
-  EVP_MD_CTX* context;
-};
 
 absl::Status TellToResume(const absl::Status& failed) {
   if (!absl::IsResourceExhausted(failed)) return failed;
@@ -59,7 +37,6 @@ absl::StatusOr<std::unique_ptr<SyncedFile>> SyncedFile::Create(const std::string
   file->durability_ = durability;
   file->written_path_ = durability == Durability::kAlone ? path + kPartSuffix : path;
   TOUCHSTONE_ASSIGN_OR_RETURN(file->file_, ReplaceUnfinished(file->written_path_, path));
-  file->hash_ = std::make_unique<Hash>();
   return file;
 }
 
@@ -81,7 +58,7 @@ absl::Status SyncedFile::Write(absl::string_view data) {
 
 absl::Status SyncedFile::Flush() {
   TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->Write(buffer_)));
-  EVP_DigestUpdate(hash_->context, buffer_.data(), buffer_.size());
+  hash_.Add({buffer_.data(), buffer_.size()});
   bytes_ += buffer_.size();
   buffer_.clear();
   return absl::OkStatus();
@@ -91,7 +68,7 @@ absl::StatusOr<FileDigest> SyncedFile::Commit() {
   TOUCHSTONE_RETURN_IF_ERROR(Flush());
   TOUCHSTONE_RETURN_IF_ERROR(TellToResume(file_->Close(/*sync=*/durability_ == Durability::kAlone)));
   if (durability_ == Durability::kAlone) TOUCHSTONE_RETURN_IF_ERROR(RenameUnfinished(written_path_, path_));
-  return FileDigest{bytes_, hash_->Hex()};
+  return FileDigest{bytes_, hash_.Hex()};
 }
 
 absl::Status RenameUnfinished(const std::string& part, const std::string& path) {

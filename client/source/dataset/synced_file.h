@@ -10,6 +10,7 @@
 #include <absl/strings/string_view.h>
 
 #include "server/base/files/file_writer.h"
+#include "server/base/text/sha256.h"
 
 namespace touchstone::client {
 
@@ -42,14 +43,13 @@ class SyncedFile {
   SyncedFile() = default;
   absl::Status Flush();
 
-  struct Hash;
   std::string path_;          // in the end
   std::string written_path_;  // until then
   Durability durability_ = Durability::kAlone;
   std::unique_ptr<FileWriter> file_;
   std::string buffer_;
   uint64_t bytes_ = 0;
-  std::unique_ptr<Hash> hash_;
+  Sha256 hash_;
 };
 
 // An error of a shard's file; where there was no room it says how to go on.

@@ -3,7 +3,6 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <openssl/evp.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -12,10 +11,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <memory>
-#include <new>
 
 #include "server/base/status.h"
+#include "server/base/text/sha256.h"
 
 namespace touchstone {
 namespace {
@@ -33,28 +31,6 @@ size_t EditDistance(absl::string_view a, absl::string_view b) {
     }
   }
   return d[a.size()][b.size()];
-}
-
-struct DigestDeleter {
-  void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
-};
-using Digest = std::unique_ptr<EVP_MD_CTX, DigestDeleter>;
-
-Digest NewSha256() {
-  Digest digest(EVP_MD_CTX_new());
-  // OpenSSL takes its memory without new, and fails where there is none.
-  if (digest == nullptr || EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr) != 1)
-    throw std::bad_alloc();
-  return digest;
-}
-
-std::string Finish(const Digest& digest) {
-  unsigned char bytes[EVP_MAX_MD_SIZE];
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(digest.get(), bytes, &size);
-  std::string hex;
-  for (unsigned int i = 0; i < size; ++i) absl::StrAppend(&hex, absl::Hex(bytes[i], absl::kZeroPad2));
-  return hex;
 }
 
 }  // namespace
@@ -84,9 +60,9 @@ std::string DidYouMean(absl::string_view word, const std::vector<std::string>& k
 }
 
 std::string Sha256Hex(const std::vector<absl::string_view>& pieces) {
-  const Digest digest = NewSha256();
-  for (const absl::string_view piece : pieces) EVP_DigestUpdate(digest.get(), piece.data(), piece.size());
-  return Finish(digest);
+  Sha256 digest;
+  for (const absl::string_view piece : pieces) digest.Add(piece);
+  return digest.Hex();
 }
 
 std::string Sha256Hex(absl::string_view data) {
@@ -96,14 +72,14 @@ std::string Sha256Hex(absl::string_view data) {
 absl::StatusOr<std::string> Sha256HexOfFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return absl::NotFoundError(absl::StrCat(path, ": cannot be read: ", std::strerror(errno)));
-  const Digest digest = NewSha256();
+  Sha256 digest;
   std::vector<char> block(1 << 20);
   while (file) {
     file.read(block.data(), block.size());
-    EVP_DigestUpdate(digest.get(), block.data(), file.gcount());
+    digest.Add({block.data(), static_cast<size_t>(file.gcount())});
   }
   if (file.bad()) return absl::DataLossError(absl::StrCat(path, ": reading failed"));
-  return Finish(digest);
+  return digest.Hex();
 }
 
 std::string ShortestNumber(double value) {
