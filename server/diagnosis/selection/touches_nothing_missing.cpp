@@ -99,14 +99,13 @@ class Tester {
 
   // An object that shifts, or turns, by as much from touch to touch.
   void AddMovingObject() {
-    for (const int first : {0, kPoseValues / 2}) {
-      std::vector<Eigen::MatrixXd> poses(o_.size());
-      for (int k = 0; k < o_.size(); ++k)
-        if (HasPoseColumns(o_, details_, o_.time_s, k)) poses[k] = PoseColumns(o_, details_, k);
+    std::vector<Eigen::MatrixXd> poses(o_.size());
+    for (int k = 0; k < o_.size(); ++k)
+      if (HasPoseColumns(o_, details_, o_.time_s, k)) poses[k] = PoseColumns(o_, details_, k);
+    for (const int first : {0, kPoseValues / 2})
       AddPerFinger(kPoseValues / 2, [&](int k, int i, int column) {
         return poses[k].size() > 0 ? poses[k](i, first + column) * k : 0;
       });
-    }
   }
 
   // `value(k, finger, column)`: what a column adds to a time, in any unit.

@@ -116,12 +116,12 @@ TEST(PhotoMistakes, TwoExchangedPicturesAreFound) {
 // The camera gave the picture of the row before, and in row 9 that of two rows before: too many rows for odd ones.
 TEST(PhotoMistakes, PicturesOfTheViewBeforeAreNamed) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
-  DiagnosisInput spoilt = input;
+  DiagnosisInput stale = input;
   auto set = std::make_shared<session::ImageSet>(*input.images);
   for (const auto& [row, shown] : {std::pair{3, 2}, {8, 7}, {9, 7}, {14, 13}})
     set->photographs[row].pixels = input.images->photographs[shown].pixels;
-  spoilt.images = set;
-  const std::vector<PhotoMistake> found = Found(spoilt);
+  stale.images = set;
+  const std::vector<PhotoMistake> found = Found(stale);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kStaleRows);
   EXPECT_EQ(found[0].problem.detail, "images 3, 8, 9, 14");

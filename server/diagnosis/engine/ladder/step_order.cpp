@@ -7,14 +7,13 @@
 #include <utility>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
 
 constexpr double kDoubtful = 0.5;  // a step that is less probable is rather none
-constexpr double kGainOfDoubtful =
-    0.003;                    // of the error on unseen parts, which it must let fall by this share
-constexpr int kMaxFits = 80;  // of one search for an order; six steps need 21 where the first order does
+constexpr int kMaxFits = 80;       // of one search for an order; six steps need 21 where the first order does
 
 // The model with only those of its further effects that are in `kept`.
 Parameterization Only(const Parameterization& model, int initial_effects, const std::set<int>& kept) {
@@ -177,7 +176,7 @@ class Orderer {
 }  // namespace
 
 bool Falls(const Quality& before, const Quality& after, const SelectedStep& step) {
-  const double kept = step.probability < kDoubtful ? 1 - kGainOfDoubtful : 1;
+  const double kept = step.probability < kDoubtful ? 1 - SearchRules().min_relative_cv_gain : 1;
   return after.rmse < before.rmse && after.heldout_rmse < kept * before.heldout_rmse;
 }
 

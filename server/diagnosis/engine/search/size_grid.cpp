@@ -7,7 +7,7 @@ namespace touchstone::diagnosis::engine {
 namespace {
 
 constexpr double kMaxOverTypical = 20;  // sizes over what rigs show
-constexpr double kLeastOverTypical = 0.2;
+constexpr double kSmallestOverTypical = 0.2;
 constexpr double kGridFactor = 1.5;
 
 }  // namespace
@@ -22,7 +22,7 @@ std::vector<double> SizesOnGrid(const FreeParameter& parameter) {
   double sign = 1;
   const double reach = Reach(parameter, &sign);
   std::vector<double> sizes;
-  for (double size = kLeastOverTypical * parameter.scale; size < reach; size *= kGridFactor)
+  for (double size = kSmallestOverTypical * parameter.scale; size < reach; size *= kGridFactor)
     sizes.push_back(size);
   if (reach > 0) sizes.push_back(reach);
   return sizes;

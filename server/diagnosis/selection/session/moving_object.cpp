@@ -73,14 +73,9 @@ Rows RowsOf(const touches::Observations& o, const touches::Prediction& d,
 // Less the mean over the repeats of each pose, where repeats tell.
 void Centre(const Rows& rows, Eigen::MatrixXd* values) {
   if (!rows.from_repeats) return;
-  std::map<int, std::vector<int>> poses;
-  for (size_t t = 0; t < rows.touches.size(); ++t) poses[rows.touches[t].pose].push_back(static_cast<int>(t));
-  for (const auto& [pose, members] : poses) {
-    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(rows.fingers, values->cols());
-    for (const int t : members)
-      mean += values->middleRows(t * rows.fingers, rows.fingers) / static_cast<double>(members.size());
-    for (const int t : members) values->middleRows(t * rows.fingers, rows.fingers) -= mean;
-  }
+  std::vector<int> pose;
+  for (const TimedTouch& touch : rows.touches) pose.push_back(touch.pose);
+  CentrePoses(pose, rows.fingers, values);
 }
 
 // The share of the variance of time that a plane over places and directions explains, of the worst object.
@@ -190,10 +185,7 @@ std::string MotionInWords(const MovingObject& found, const Eigen::Vector3d& alon
 
 std::optional<MovingObject> FindMovingObject(const touches::Observations& o, const touches::Prediction& d,
                                              const std::vector<double>& residuals) {
-  const bool has_details = d.contact_m.size() == residuals.size() && d.normal.size() == residuals.size() &&
-                           d.inverse_speed_s_per_m.size() == residuals.size() &&
-                           d.cos_incidence.size() == residuals.size();
-  if (o.fingers < 2 || !has_details) return std::nullopt;
+  if (o.fingers < 2 || !HasPoseDetails(d, residuals)) return std::nullopt;
   const Rows rows = RowsOf(o, d, residuals);
   if (rows.objects == 0 || rows.objects > kMaxMovingObjects || rows.degrees < kMinMovingDegrees)
     return std::nullopt;

@@ -1,6 +1,7 @@
 #include "server/diagnosis/selection/session/pose_columns.h"
 
 #include <cmath>
+#include <map>
 
 namespace touchstone::diagnosis::selection {
 
@@ -13,6 +14,24 @@ bool HasPoseColumns(const touches::Observations& o, const touches::Prediction& d
       return false;
   }
   return true;
+}
+
+bool HasPoseDetails(const touches::Prediction& d, const std::vector<double>& residuals) {
+  return d.contact_m.size() == residuals.size() && d.normal.size() == residuals.size() &&
+         d.inverse_speed_s_per_m.size() == residuals.size() && d.cos_incidence.size() == residuals.size();
+}
+
+int CentrePoses(const std::vector<int>& pose, int fingers, Eigen::MatrixXd* rows) {
+  std::map<int, std::vector<int>> poses;
+  for (int t = 0; t < static_cast<int>(pose.size()); ++t) poses[pose[t]].push_back(t);
+  int repeats = 0;
+  for (const auto& [number, members] : poses) {
+    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(fingers, rows->cols());
+    for (const int t : members) mean += rows->middleRows(t * fingers, fingers) / members.size();
+    for (const int t : members) rows->middleRows(t * fingers, fingers) -= mean;
+    repeats += static_cast<int>(members.size()) - 1;
+  }
+  return repeats;
 }
 
 Eigen::MatrixXd PoseColumns(const touches::Observations& o, const touches::Prediction& d, int k) {

@@ -45,20 +45,6 @@ std::vector<ObjectRounds> RoundsOf(const touches::Observations& o, const touches
   return objects;
 }
 
-// Takes the mean over the repeats of each pose from the rows of every touch; returns how many touches are repeats.
-int CentrePoses(const ObjectRounds& object, int fingers, Eigen::MatrixXd* rows) {
-  std::map<int, std::vector<int>> poses;
-  for (int t = 0; t < static_cast<int>(object.touch.size()); ++t) poses[object.pose[t]].push_back(t);
-  int repeats = 0;
-  for (const auto& [pose, members] : poses) {
-    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(fingers, rows->cols());
-    for (const int t : members) mean += rows->middleRows(t * fingers, fingers) / members.size();
-    for (const int t : members) rows->middleRows(t * fingers, fingers) -= mean;
-    repeats += static_cast<int>(members.size()) - 1;
-  }
-  return repeats;
-}
-
 // What a pose in every round explains of the residuals of one object, repeats centred.
 struct ObjectFit {
   const ObjectRounds* rounds = nullptr;
@@ -84,7 +70,7 @@ void AddObject(const touches::Observations& o, const touches::Prediction& d,
     rows.block(t * o.fingers, 1 + object.round[t] * kPoseValues, o.fingers, kPoseValues) =
         PoseColumns(o, d, k);
   }
-  const int repeats = CentrePoses(object, o.fingers, &rows);
+  const int repeats = CentrePoses(object.pose, o.fingers, &rows);
   const ColumnSpan span(rows.rightCols(values));
   const double dof = static_cast<double>(repeats) * (o.fingers - 1);
   if (dof < static_cast<double>(span.rank()) + kMinRoundDegrees) return;
@@ -140,10 +126,7 @@ double PermutedP(const Squares& squares, int fingers) {
 RoundStructure FindRoundStructure(const touches::Observations& o, const touches::Prediction& d,
                                   const std::vector<double>& residuals) {
   RoundStructure found;
-  const bool has_details = d.contact_m.size() == residuals.size() && d.normal.size() == residuals.size() &&
-                           d.inverse_speed_s_per_m.size() == residuals.size() &&
-                           d.cos_incidence.size() == residuals.size();
-  if (o.fingers < 2 || !has_details || o.set->round.empty()) return found;
+  if (o.fingers < 2 || !HasPoseDetails(d, residuals) || o.set->round.empty()) return found;
   Squares squares;
   const std::vector<ObjectRounds> objects = RoundsOf(o, d, residuals);
   for (const ObjectRounds& object : objects)
