@@ -14,6 +14,9 @@ target_compile_options(touchstone_flags INTERFACE
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64" AND TOUCHSTONE_ARCH)
   target_compile_options(touchstone_flags INTERFACE -march=${TOUCHSTONE_ARCH})
 endif()
+if(TOUCHSTONE_CHANGEABLE_RULES)
+  target_compile_definitions(touchstone_flags INTERFACE TOUCHSTONE_CHANGEABLE_RULES)
+endif()
 
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 set(CMAKE_C_FLAGS_RELEASE "-O3 -DNDEBUG")

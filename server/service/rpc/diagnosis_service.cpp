@@ -4,11 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
-#include <thread>
 
 #include "server/base/status.h"
 #include "server/base/text/over_limit.h"
@@ -19,6 +15,7 @@
 #include "server/effects/all_effects.h"
 #include "server/service/calls/evidence.h"
 #include "server/service/core/convert.h"
+#include "server/service/rpc/diagnosis_worker.h"
 #include "server/uncertainty/posterior_message.h"
 
 namespace touchstone::service {
@@ -41,77 +38,8 @@ absl::StatusOr<v1::Report> AsReport(const absl::StatusOr<diagnosis::report::Diag
   return diagnosis::report::ToReport(*diagnosis);
 }
 
-constexpr std::chrono::milliseconds kProgressInterval{250};
 constexpr int kMaxFurther = 99;  // sessions beside the first
 constexpr int kDefaultProposedTouches = 24, kDefaultProposedPhotographs = 12;
-
-// Nothing catches what leaves a thread: the process would end, and with it what other clients do.
-absl::StatusOr<v1::Report> WithoutExceptions(
-    const std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisContext&)>& work,
-    const diagnosis::DiagnosisContext& context) {
-  try {
-    return work(context);
-  } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError("there is not enough memory for this set at this server");
-  } catch (const std::exception& error) {
-    return absl::InternalError(absl::StrCat("the diagnosis ended with an unexpected error: ", error.what()));
-  }
-}
-
-// Where every diagnosis begins.
-v1::Progress Reading() {
-  v1::Progress progress;
-  progress.set_stage("reading");
-  return progress;
-}
-
-// The work runs in a thread of its own and only leaves notes here, so that progress is sent in time whatever
-// the work is at, and a client that reads slowly does not hold it up.
-class Worker {
- public:
-  explicit Worker(std::function<absl::StatusOr<v1::Report>(const diagnosis::DiagnosisContext&)> work,
-                  ThreadPool* pool)
-      : thread_([this, work = std::move(work), pool] {
-          diagnosis::DiagnosisContext context;
-          context.pool = pool;
-          context.progress = [this](const std::string& stage, double done) { return Note(stage, done); };
-          absl::StatusOr<v1::Report> report = WithoutExceptions(work, context);
-          std::lock_guard<std::mutex> lock(mutex_);
-          report_ = std::move(report);
-          finished_ = true;
-          wake_.notify_all();
-        }) {}
-  ~Worker() {
-    cancelled_ = true;
-    thread_.join();
-  }
-
-  // Waits a little; true when the work is done.
-  bool Wait(v1::Progress* progress) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    wake_.wait_for(lock, kProgressInterval, [&] { return finished_; });
-    *progress = progress_;
-    return finished_;
-  }
-  void Cancel() { cancelled_ = true; }
-  absl::StatusOr<v1::Report>& report() { return report_; }  // after Wait said true
-
- private:
-  bool Note(const std::string& stage, double done) {
-    std::lock_guard<std::mutex> lock(mutex_);
-    progress_.set_stage(stage);
-    progress_.set_done(std::min(std::max(done, 0.0), 1.0));
-    return !cancelled_;
-  }
-
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  v1::Progress progress_ = Reading();
-  bool finished_ = false;
-  std::atomic<bool> cancelled_{false};
-  absl::StatusOr<v1::Report> report_ = absl::UnknownError("not finished");
-  std::thread thread_;  // last: it uses the others
-};
 
 // Hash of the set, as a file; empty: it came as columns.
 std::string HashOfSet(const v1::Evidence& evidence, const diagnosis::DiagnosisInput& input,
@@ -168,7 +96,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
   TOUCHSTONE_ASSIGN_OR_RETURN(const Places::Place place, resources->diagnoses->Take(ClientOf(*context)));
   const Clock& clock = *resources->options.clock;
   const auto begin = clock.Now();
-  Worker worker(
+  DiagnosisWorker worker(
       [&](const diagnosis::DiagnosisContext& how) -> absl::StatusOr<v1::Report> {
         TOUCHSTONE_ASSIGN_OR_RETURN(const diagnosis::DiagnosisInput input,
                                     ReadEvidence(evidence, *resources, work.times));
@@ -193,7 +121,7 @@ absl::Status Run(grpc::ServerContext* context, const v1::Evidence& evidence, con
         return report;
       },
       resources->pool.get());
-  v1::Progress progress = Reading();
+  v1::Progress progress = ProgressOfReading();
   if (!send(progress)) worker.Cancel();
   const double max_s = resources->options.max_diagnosis_s;
   const auto late = [&] { return clock.SecondsSince(begin) > max_s; };

@@ -9,6 +9,7 @@
 #include "server/base/text/text.h"
 #include "server/base/units.h"
 #include "server/session/journal/journal_file.h"
+#include "server/session/journal/journal_head.h"
 #include "server/session/journal/journal_rows.h"
 
 namespace touchstone::session {

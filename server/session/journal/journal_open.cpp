@@ -13,6 +13,7 @@
 
 #include "server/base/files/file_writer.h"
 #include "server/base/status.h"
+#include "server/session/journal/journal_head.h"
 #include "server/session/journal/journal_schema.h"
 #include "server/session/journal/journal_seal.h"
 #include "server/session/journal/journal_version1.h"

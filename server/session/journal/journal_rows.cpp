@@ -5,6 +5,7 @@
 #include "server/base/status.h"
 #include "server/session/images/emulated.h"
 #include "server/session/journal/command_bytes.h"
+#include "server/session/journal/journal_head.h"
 #include "server/session/journal/journal_views.h"
 
 namespace touchstone::session {

@@ -1,40 +1,12 @@
 #include "server/session/journal/journal_seal.h"
 
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
-#include "server/base/text/text.h"
+#include "server/session/journal/journal_checksum.h"
 
 namespace touchstone::session {
 namespace {
-
-uint64_t ChecksumOf(absl::string_view bytes) {
-  uint64_t checksum = 0;
-  (void)absl::SimpleHexAtoi(Sha256Hex(bytes).substr(0, 16), &checksum);
-  return checksum;
-}
-
-// Appends all rows of a query, each with its place.
-absl::Status AppendRows(SqliteStatement rows, std::string* bytes) {
-  for (int64_t place = 0;; ++place) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, rows.Step());
-    if (!found) return absl::OkStatus();
-    absl::StrAppend(bytes, place, ":");
-    rows.AppendRow("checksum", bytes);
-  }
-}
-
-absl::StatusOr<uint64_t> Checksum(SqliteFile* file, std::initializer_list<const char*> queries, int64_t key) {
-  std::string bytes;
-  for (const char* query : queries) {
-    bytes += '|';
-    SqliteStatement rows = file->Prepare(query);
-    rows.Bind(key);
-    TOUCHSTONE_RETURN_IF_ERROR(AppendRows(std::move(rows), &bytes));
-  }
-  return ChecksumOf(bytes);
-}
 
 absl::StatusOr<uint64_t> TouchChecksum(SqliteFile* file, int64_t touch_id) {
   return Checksum(file,
@@ -64,22 +36,18 @@ absl::StatusOr<uint64_t> SessionChecksum(SqliteFile* file, int64_t session_id) {
                   session_id);
 }
 
-// The session's name as far as it can be read.
-std::string NameOf(SqliteFile* file, int64_t session_id) {
-  SqliteStatement row = file->Prepare("SELECT name FROM session WHERE session_id = ?");
-  row.Bind(session_id);
-  const auto found = row.Step();
-  return found.ok() && *found ? row.Text(0) : absl::StrCat("number ", session_id);
+absl::Status IsGone(const SqliteFile& file, const char* thing, int64_t row_id) {
+  return Damaged(file, absl::StrCat("the ", thing, " in row ", row_id, " is gone"),
+                 "if nobody has deleted its session meanwhile, the journal is damaged: read it again");
 }
 
-absl::Status Damaged(const SqliteFile& file, absl::string_view what, absl::string_view remedy) {
-  return absl::DataLossError(absl::StrCat("journal ", file.path(), ": ", what, "; ", remedy));
-}
-
-// What helps against a row that is damaged or missing.
-std::string ExportTheRest(const SqliteFile& file, absl::string_view session) {
-  return absl::StrCat("keep a copy, then write what is whole with: touchstone session export ", file.path(),
-                      " ", session, " --skip-damaged -o rest.h5");
+// `row`: "touch 3 ('id')".
+absl::Status Differs(SqliteFile* file, const std::string& row, int64_t session_id) {
+  const std::string session = NameOfSession(file, session_id);
+  return Damaged(
+      *file,
+      absl::StrCat(row, " of session '", session, "' is damaged: what is stored differs from its checksum"),
+      ExportTheRest(*file, session));
 }
 
 // What is listed of a session's rows: `ids`, the sum of their checksums, and whether their numbers rise.
@@ -121,7 +89,7 @@ absl::Status ReadIds(SqliteFile* file, const char* query, const char* by_index, 
   if (in_order && count == static_cast<int64_t>(ids->size()) &&
       digest == (images ? tally.image_digest : tally.touch_digest))
     return absl::OkStatus();
-  const std::string session = NameOf(file, session_id);
+  const std::string session = NameOfSession(file, session_id);
   const char* things = images ? "pictures" : "touches";
   return Damaged(
       *file,
@@ -129,38 +97,6 @@ absl::Status ReadIds(SqliteFile* file, const char* query, const char* by_index, 
                    " are found",
                    count == static_cast<int64_t>(ids->size()) ? ", but not those that were written" : ""),
       ExportTheRest(*file, session));
-}
-
-struct Head {
-  int64_t sessions = 0;
-  uint64_t fact_digest = 0;
-};
-
-absl::StatusOr<Head> ReadHead(SqliteFile* file) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t checksum,
-                              Checksum(file, {"SELECT * FROM head WHERE head_id = ?"}, 1));
-  SqliteStatement row = file->Prepare("SELECT sessions, fact_digest, checksum FROM head WHERE head_id = 1");
-  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-  if (!found || static_cast<uint64_t>(row.Integer(2)) != checksum)
-    return Damaged(*file, "its own row (table head) is damaged", ExportTheRest(*file, "SESSION"));
-  return Head{row.Integer(0), static_cast<uint64_t>(row.Integer(1))};
-}
-
-absl::Status WriteHead(SqliteFile* file, const Head& head) {
-  TOUCHSTONE_RETURN_IF_ERROR(
-      file->Prepare("INSERT INTO head(head_id, sessions, fact_digest, checksum) VALUES(1, ?, ?, "
-                    "0) ON CONFLICT(head_id) DO UPDATE SET sessions = excluded.sessions, "
-                    "fact_digest = excluded.fact_digest")
-          .Bind(head.sessions)
-          .Bind(static_cast<int64_t>(head.fact_digest))
-          .Run());
-  TOUCHSTONE_ASSIGN_OR_RETURN(const uint64_t checksum,
-                              Checksum(file, {"SELECT * FROM head WHERE head_id = ?"}, 1));
-  return file->Prepare("UPDATE head SET checksum = ?").Bind(static_cast<int64_t>(checksum)).Run();
-}
-
-uint64_t FactChecksum(const std::string& key, const std::string& value) {
-  return ChecksumOf(absl::StrCat("fact|", key.size(), ":", key, value));
 }
 
 }  // namespace
@@ -178,7 +114,7 @@ absl::StatusOr<SessionTally> ReadTally(SqliteFile* file, int64_t session_id) {
   row.Bind(session_id);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (!found || (file->has_checksums() && static_cast<uint64_t>(row.Integer(6)) != checksum)) {
-    const std::string session = NameOf(file, session_id);
+    const std::string session = NameOfSession(file, session_id);
     return Damaged(*file, absl::StrCat("the counts of session '", session, "' are damaged"),
                    ExportTheRest(*file, session));
   }
@@ -223,16 +159,9 @@ absl::StatusOr<TouchSeal> CheckTouch(SqliteFile* file, int64_t touch_id) {
       file->Prepare("SELECT stage, checksum, number, id, session_id FROM touch WHERE touch_id = ?");
   row.Bind(touch_id);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-  if (!found)
-    return Damaged(*file, absl::StrCat("the touch in row ", touch_id, " is gone"),
-                   "if nobody has deleted its session meanwhile, the journal is damaged: read it again");
-  if (file->has_checksums() && checksum != static_cast<uint64_t>(row.Integer(1))) {
-    const std::string session = NameOf(file, row.Integer(4));
-    return Damaged(*file,
-                   absl::StrCat("touch ", row.Integer(2), " ('", row.Text(3), "') of session '", session,
-                                "' is damaged: what is stored differs from its checksum"),
-                   ExportTheRest(*file, session));
-  }
+  if (!found) return IsGone(*file, "touch", touch_id);
+  if (file->has_checksums() && checksum != static_cast<uint64_t>(row.Integer(1)))
+    return Differs(file, absl::StrCat("touch ", row.Integer(2), " ('", row.Text(3), "')"), row.Integer(4));
   return TouchSeal{static_cast<uint64_t>(row.Integer(1)), static_cast<TouchStage>(row.Integer(0))};
 }
 
@@ -272,15 +201,9 @@ absl::Status CheckImage(SqliteFile* file, int64_t image_id) {
       file->Prepare("SELECT checksum, number, id, session_id FROM image WHERE image_id = ?");
   row.Bind(image_id);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-  if (!found)
-    return Damaged(*file, absl::StrCat("the picture in row ", image_id, " is gone"),
-                   "if nobody has deleted its session meanwhile, the journal is damaged: read it again");
+  if (!found) return IsGone(*file, "picture", image_id);
   if (checksum == static_cast<uint64_t>(row.Integer(0))) return absl::OkStatus();
-  const std::string session = NameOf(file, row.Integer(3));
-  return Damaged(*file,
-                 absl::StrCat("picture ", row.Integer(1), " ('", row.Text(2), "') of session '", session,
-                              "' is damaged: what is stored differs from its checksum"),
-                 ExportTheRest(*file, session));
+  return Differs(file, absl::StrCat("picture ", row.Integer(1), " ('", row.Text(2), "')"), row.Integer(3));
 }
 
 absl::Status SealNewImage(SqliteFile* file, int64_t image_id, SessionTally* tally) {
@@ -301,7 +224,7 @@ absl::Status CheckSession(SqliteFile* file, int64_t session_id) {
   row.Bind(session_id);
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
   if (found && static_cast<uint64_t>(row.Integer(0)) == checksum) return absl::OkStatus();
-  const std::string session = found ? row.Text(1) : NameOf(file, session_id);
+  const std::string session = found ? row.Text(1) : NameOfSession(file, session_id);
   return Damaged(
       *file,
       absl::StrCat("the head of session '", session,
@@ -328,81 +251,6 @@ absl::Status ReadImageIds(SqliteFile* file, int64_t session_id, std::vector<int6
   return ReadIds(file, "SELECT image_id, number, checksum FROM image WHERE session_id = ? ORDER BY number",
                  "SELECT image_id, number, 0 FROM image WHERE session_id = ? ORDER BY number", session_id,
                  true, ids);
-}
-
-absl::Status InsertHead(SqliteFile* file) {
-  return WriteHead(file, Head());
-}
-
-absl::Status AddToSessionCount(SqliteFile* file, int64_t change) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(Head head, ReadHead(file));
-  head.sessions += change;
-  return WriteHead(file, head);
-}
-
-absl::Status CheckSessionCount(SqliteFile* file) {
-  if (!file->has_checksums()) return absl::OkStatus();
-  const SqliteSnapshot snapshot(file);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Head head, ReadHead(file));
-  // By the table itself and not by an index.
-  TOUCHSTONE_ASSIGN_OR_RETURN(const int64_t found, file->Number("SELECT count(*) FROM session NOT INDEXED"));
-  if (found == head.sessions) return absl::OkStatus();
-  return Damaged(*file, absl::StrCat(found, " of its ", head.sessions, " sessions are found"),
-                 ExportTheRest(*file, "SESSION"));
-}
-
-absl::Status WriteFact(SqliteFile* file, const std::string& key, const std::string& value) {
-  TOUCHSTONE_ASSIGN_OR_RETURN(Head head, ReadHead(file));
-  {
-    SqliteStatement row = file->Prepare("SELECT checksum FROM fact WHERE key = ?");
-    row.Bind(key);
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-    if (found) head.fact_digest -= static_cast<uint64_t>(row.Integer(0));
-  }
-  const uint64_t checksum = FactChecksum(key, value);
-  head.fact_digest += checksum;
-  TOUCHSTONE_RETURN_IF_ERROR(
-      file->Prepare(
-              "INSERT INTO fact(key, value, checksum) VALUES(?, ?, ?) ON CONFLICT(key) DO UPDATE SET value = "
-              "excluded.value, checksum = excluded.checksum")
-          .Bind(key)
-          .Bind(value)
-          .Bind(static_cast<int64_t>(checksum))
-          .Run());
-  return WriteHead(file, head);
-}
-
-absl::StatusOr<std::string> ReadFact(SqliteFile* file, const std::string& key) {
-  const SqliteSnapshot snapshot(file);
-  const std::string remedy =
-      "keep a copy, export its sessions, and let the gateway begin a new journal; then say what lies on the "
-      "fixture "
-      "(touchstone rig mount)";
-  SqliteStatement row = file->Prepare("SELECT value, checksum FROM fact WHERE key = ?");
-  row.Bind(key);
-  TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, row.Step());
-  if (found) {
-    std::string value = row.Text(0);
-    if (file->has_checksums() && static_cast<uint64_t>(row.Integer(1)) != FactChecksum(key, value))
-      return Damaged(
-          *file,
-          absl::StrCat("what it says of '", key, "' is damaged: '", value, "' differs from its checksum"),
-          remedy);
-    return value;
-  }
-  if (!file->has_checksums()) return std::string();
-  // That it is not there must be true.
-  TOUCHSTONE_ASSIGN_OR_RETURN(const Head head, ReadHead(file));
-  uint64_t digest = 0;
-  SqliteStatement all = file->Prepare("SELECT key, value FROM fact");
-  while (true) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool more, all.Step());
-    if (!more) break;
-    digest += FactChecksum(all.Text(0), all.Text(1));
-  }
-  if (digest == head.fact_digest) return std::string();
-  return Damaged(*file, absl::StrCat("it does not say '", key, "', and one of its facts is damaged or lost"),
-                 remedy);
 }
 
 uint64_t SeriesChecksum(const JournalSeries& series) {

@@ -49,14 +49,6 @@ absl::Status SealSession(SqliteFile* file, int64_t session_id);
 absl::Status ReadTouchIds(SqliteFile* file, int64_t session_id, std::vector<int64_t>* ids);
 absl::Status ReadImageIds(SqliteFile* file, int64_t session_id, std::vector<int64_t>* ids);
 
-// The journal's own row: how many sessions there are, and the sum of its facts.
-absl::Status InsertHead(SqliteFile* file);
-absl::Status AddToSessionCount(SqliteFile* file, int64_t change);
-absl::Status CheckSessionCount(SqliteFile* file);
-
-absl::Status WriteFact(SqliteFile* file, const std::string& key, const std::string& value);
-absl::StatusOr<std::string> ReadFact(SqliteFile* file, const std::string& key);  // "" if it is not there
-
 uint64_t SeriesChecksum(const JournalSeries& series);
 
 }  // namespace touchstone::session

@@ -5,6 +5,7 @@
 
 #include "server/base/status.h"
 #include "server/session/journal/journal_file.h"
+#include "server/session/journal/journal_head.h"
 #include "server/session/journal/journal_rows.h"
 
 namespace touchstone::session {

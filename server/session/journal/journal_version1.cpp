@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "server/base/status.h"
+#include "server/session/journal/journal_head.h"
 #include "server/session/journal/journal_schema.h"
 #include "server/session/journal/journal_seal.h"
 #include "server/session/journal/journal_version2.h"
