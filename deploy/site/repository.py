@@ -79,7 +79,7 @@ def _cell(cell):
 def with_links_to_pages(markdown: str, page: str) -> str:
     """Links to sources lead to their pages, those to a folder to its README, and those in HTML to what becomes of Markdown."""
 
-    def mended(match):
+    def corrected(match):
         opening, target = match.groups()
         path = target_path(page, target)
         if path is None:
@@ -92,4 +92,4 @@ def with_links_to_pages(markdown: str, page: str) -> str:
             target = posixpath.relpath(source_page(path), posixpath.dirname(page) or ".")
         return opening + target
 
-    return TARGET.sub(mended, markdown)
+    return TARGET.sub(corrected, markdown)

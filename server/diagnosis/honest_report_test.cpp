@@ -29,9 +29,9 @@ double Compared(DiagnosisInput input, const model::Model& model) {
   return compared.ok() ? compared->data[0].initial->rmse : NAN;
 }
 
-DiagnosisInput Spoilt(DiagnosisInput input, const std::function<void(session::MeasurementSet*)>& spoil) {
+DiagnosisInput Corrupted(DiagnosisInput input, const std::function<void(session::MeasurementSet*)>& corrupt) {
   auto set = std::make_shared<session::MeasurementSet>(*input.set);
-  spoil(set.get());
+  corrupt(set.get());
   input.set = set;
   return input;
 }
@@ -82,7 +82,7 @@ TEST(HonestReport, SavesWhatItsLadderShows) {
 }
 
 TEST(HonestReport, ForbidsAdequateWhereManyTouchesAreSetAside) {
-  const DiagnosisInput input = Spoilt(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
+  const DiagnosisInput input = Corrupted(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
     RandomStream random(3, RandomDomain::kDiagnosis, 1);
     for (int row = 0; row < set->size(); ++row)
       if (random.Uniform() < 0.04) set->time_s[row * 3 + random.Below(3)] += 0.1;
@@ -101,7 +101,7 @@ TEST(HonestReport, SetsOneWildReadingAsideAndNamesIt) {
   ASSERT_EQ(whole.steps.size(), 1u);
   for (const double late_s : {0.6, 3.0, 1000.0}) {
     const report::Diagnosis diagnosis = Diagnosed(
-        Spoilt(input, [late_s](session::MeasurementSet* set) { set->time_s[3 * 7 + 1] += late_s; }));
+        Corrupted(input, [late_s](session::MeasurementSet* set) { set->time_s[3 * 7 + 1] += late_s; }));
     EXPECT_EQ(diagnosis.verdict, engine::Verdict::kMissingEffects) << late_s << ": " << diagnosis.summary;
     ASSERT_EQ(diagnosis.steps.size(), 1u) << late_s;
     EXPECT_EQ(diagnosis.steps[0].effect, "tip_radius");
@@ -112,7 +112,7 @@ TEST(HonestReport, SetsOneWildReadingAsideAndNamesIt) {
 
 // The times of one object's last round belong to other poses of the round.
 TEST(HonestReport, NamesTheRoundAndTheObjectThatWereSetAside) {
-  const DiagnosisInput input = Spoilt(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
+  const DiagnosisInput input = Corrupted(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
     const int last = 72 + 48;  // the second object's rows 72 to 143, its last round from here
     for (int row = last; row < last + 5; ++row)
       for (int i = 0; i < 3; ++i)
@@ -165,7 +165,7 @@ TEST(HonestReport, SaysHowLikelyDataOfTheGivenModelLookAsBad) {
 }
 
 TEST(HonestReport, SaysThatAPartOfTheTimesWasReadInTicks) {
-  const DiagnosisInput input = Spoilt(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
+  const DiagnosisInput input = Corrupted(touches::MakeTestInput({}), [](session::MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row) {
       const double step_s = row % 2 == 0 ? 0.01 : 1e-6;
       for (int i = 0; i < 3; ++i)
@@ -186,7 +186,7 @@ DiagnosisInput PushedInOneRound(touches::HiddenRig rig) {
   const DiagnosisInput right = touches::MakeTestInput(rig);
   rig.hidden = {{"object_push", {"shift_mm=0.1"}}};
   const DiagnosisInput pushed = touches::MakeTestInput(rig);
-  return Spoilt(right, [&](session::MeasurementSet* set) {
+  return Corrupted(right, [&](session::MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row)
       if (row / 48 % 4 == 2)
         for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] = pushed.set->time_s[row * 3 + i];
@@ -229,7 +229,7 @@ TEST(HonestReport, AnEffectOfOneRoundIsToldAsSuchBesidePhotographs) {
 TEST(HonestReport, ARoundAtAnotherSpeedIsAMistakeOfTheFile) {
   touches::HiddenRig rig;
   rig.rounds = 4;
-  const report::Diagnosis diagnosis = Diagnosed(Spoilt(touches::MakeTestInput(rig), [](auto* set) {
+  const report::Diagnosis diagnosis = Diagnosed(Corrupted(touches::MakeTestInput(rig), [](auto* set) {
     for (int row = 0; row < set->size(); ++row)
       if (row / 24 % 4 == 2)
         for (int i = 0; i < 3; ++i) set->time_s[row * 3 + i] /= 1.05;
@@ -248,7 +248,7 @@ TEST(HonestReport, ASlipThatGrowsIsNoRoundAtAnotherSpeed) {
   const DiagnosisInput slipping = touches::MakeTestInput(rig);
   // The objects take turns, so that rounds follow one another: the session's time, and with it the slip.
   const int per_object = input.set->size() / 3, per_round = per_object / 3;
-  const report::Diagnosis diagnosis = Diagnosed(Spoilt(input, [&](auto* set) {
+  const report::Diagnosis diagnosis = Diagnosed(Corrupted(input, [&](auto* set) {
     for (int row = 0; row < set->size(); ++row) {
       const int within = row % per_object, round = within / per_round;
       set->session_time_s[row] = 9.0 * (3 * per_round * round + 3 * (within % per_round) + row / per_object);

@@ -61,12 +61,12 @@ SharedEffects Found(const HiddenSession& session) {
   return Found(MakeInputs(session));
 }
 
-const images::NamedValues kAskew = {
+const images::NamedValues kRotated = {
     {"object_pose", {"translation_mm=0.4,-0.3,0.2", "rotation_deg=0.3,0.2,-0.4"}}};
 
-TEST(SharedEffects, ObjectPutDownAskewIsFoundByBothAndTighterThanByEither) {
+TEST(SharedEffects, ObjectPutDownRotatedIsFoundByBothAndTighterThanByEither) {
   TOUCHSTONE_SECOND_TIER("long: three whole diagnoses of pictures");
-  const SharedEffects found = Found(WithHidden(kAskew));
+  const SharedEffects found = Found(WithHidden(kRotated));
   ASSERT_EQ(found.steps.size(), 1u);
   EXPECT_TRUE(found.conflicts.empty());
   const SharedStep& step = found.steps[0];
@@ -187,16 +187,16 @@ TEST(SharedEffects, ConflictIsSaidAndNotAveraged) {
 
 // Sixty sessions: minutes.
 TEST(SharedEffects, DISABLED_ManySessionsAreToldRightly) {
-  int askew = 0, one_askew = 0, tools = 0, cameras = 0, nothing = 0, conflicts = 0;
+  int rotated = 0, one_rotated = 0, tools = 0, cameras = 0, nothing = 0, conflicts = 0;
   std::map<std::string, int> covered;
   for (uint64_t seed = 500; seed < 512; ++seed) {
     const auto seeded = [&](HiddenSession session) {
       session.rig.seed = session.camera.seed = seed;
       return Found(session);
     };
-    SharedEffects found = seeded(WithHidden(kAskew));
-    askew += found.steps.size() == 1 && found.steps[0].effect == "object_pose" &&
-             found.steps[0].shown_by == "both";
+    SharedEffects found = seeded(WithHidden(kRotated));
+    rotated += found.steps.size() == 1 && found.steps[0].effect == "object_pose" &&
+               found.steps[0].shown_by == "both";
     conflicts += !found.conflicts.empty();
     const double truth[] = {0.4, -0.3, 0.2, 0.3, 0.2, -0.4};
     for (size_t i = 0; i < 6 && found.steps.size() == 1; ++i) {
@@ -214,15 +214,16 @@ TEST(SharedEffects, DISABLED_ManySessionsAreToldRightly) {
                              {"camera_rotation", {"rotation_deg=0.1,0.1,0"}}};
     found = seeded(session);
     cameras += found.steps.empty() && found.conflicts.empty();
-    session = WithHidden(kAskew);
+    session = WithHidden(kRotated);
     session.rig.hidden.push_back({"finger_spacing", {"delta_mm=0.4"}});
     session.camera.hidden.push_back({"focal_error", {"relative=0.01"}});
     found = seeded(session);
-    one_askew += found.steps.size() == 1 && found.steps[0].effect == "object_pose";
+    one_rotated += found.steps.size() == 1 && found.steps[0].effect == "object_pose";
     conflicts += !found.conflicts.empty();
   }
-  std::cout << "askew " << askew << ", askew with a tool and a lens " << one_askew << ", nothing " << nothing
-            << ", tools " << tools << ", cameras " << cameras << " of 12; conflicts " << conflicts << "\n";
+  std::cout << "rotated " << rotated << ", rotated with a tool and a lens " << one_rotated << ", nothing "
+            << nothing << ", tools " << tools << ", cameras " << cameras << " of 12; conflicts " << conflicts
+            << "\n";
   for (const auto& [name, count] : covered) std::cout << "  " << name << " covered " << count << "\n";
 }
 

@@ -133,7 +133,7 @@ class RunningStream {
   std::unique_ptr<grpc::ClientReader<v1::StreamDatasetResponse>> reader_;
 };
 
-TEST(Connections, ThatSayNothingDoNotMakeAServerDeaf) {
+TEST(Connections, ThatSayNothingDoNotMakeAServerUnreachable) {
   const ServerProcess server(128, "--handshake-s 0.3 --max-connections-per-address 100000");
   ASSERT_NE(server.port(), 0);
   SilentConnections silent(server.port());

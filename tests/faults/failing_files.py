@@ -185,7 +185,7 @@ def sessions_of(path: pathlib.Path) -> dict[str, str]:
     return found
 
 
-# SQLite needs its own files beside a journal, to mend it when it is opened next.
+# SQLite needs its own files beside a journal, to recover when it is opened next.
 JOURNAL_ENDINGS = (".db", ".db-journal", ".db-wal", ".db-shm", ".db.lock")
 
 

@@ -44,7 +44,7 @@ async def _all(target, clients, refusals):
 def run(clients: int = 1000) -> Result:
     """clients: how many at once."""
     result, refusals = Result(), []
-    # As many addresses as one machine has: the limit of connections per address is for strangers.
+    # As many addresses as one machine has: the limit of connections per address is for other machines.
     with Server("--max-connections-per-address", str(clients + 10)) as server:
         answers = asyncio.run(_all(server.target, clients, refusals))
         failed = [answer for answer in answers if isinstance(answer, BaseException)]

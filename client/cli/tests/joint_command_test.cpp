@@ -63,8 +63,8 @@ class JointCommand : public RealBinaryTest {
     return nlohmann::json::parse(outcome.out, nullptr, false);
   }
 
-  // One object lies askew, which both kinds show; the camera exposes longer, which only its pictures show.
-  static HiddenSession Askew() {
+  // One object lies rotated, which both kinds show; the camera exposes longer, which only its pictures show.
+  static HiddenSession Rotated() {
     HiddenSession session = diagnosis::joint::WithHidden(
         {{"object_pose", {"translation_mm=0.5,-0.4,0.3", "rotation_deg=0.3,0.2,-0.4"}}});
     session.camera.hidden.push_back({"exposure", {"stops=0.2"}});
@@ -84,7 +84,7 @@ const nlohmann::json& StepOf(const nlohmann::json& report, const std::string& ef
 
 TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
   TOUCHSTONE_SECOND_TIER("long: whole diagnoses of pictures and touches");
-  WriteSession("session", Askew());
+  WriteSession("session", Rotated());
   const nlohmann::json report = Report({"diagnose", "session", "--model", "nominal.yaml", "--save-model",
                                         "better.yaml", "--html", "report.html"});
   ASSERT_EQ(report["verdict"], "MISSING_EFFECTS") << report["summary"];
@@ -128,7 +128,7 @@ TEST_F(JointCommand, OneDiagnosisOfBothIsFoundAgainByComparisons) {
 }
 
 TEST_F(JointCommand, ProposesOfASetOfBothTheKindThatIsAskedFor) {
-  WriteSession("session", Askew());
+  WriteSession("session", Rotated());
   const auto propose = [this](const std::vector<std::string>& how) {
     std::vector<std::string> command = {"propose",      "session",    "--model",
                                         "nominal.yaml", "--mesh-dir", "meshes"};

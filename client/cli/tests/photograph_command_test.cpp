@@ -118,12 +118,12 @@ TEST_F(PhotographCommand, PrintedFixesLeadToThePromisedError) {
                                              {"--swap-objects", "lat00,lat20"},
                                              {"--shift-rows=1"}}) {
     SCOPED_TRACE(mistake[0]);
-    const std::string spoilt = absl::StrCat("spoilt", ++number);
-    std::vector<std::string> spoil = {"session", "fix", "photos", "-o", spoilt};
-    spoil.insert(spoil.end(), mistake.begin(), mistake.end());
-    const Outcome spoiling = Run(spoil);
-    ASSERT_EQ(spoiling.exit_code, 0) << spoiling.err;
-    const nlohmann::json report = Report({"diagnose", spoilt, "--model", "nominal.yaml"});
+    const std::string corrupted = absl::StrCat("corrupted", ++number);
+    std::vector<std::string> corrupt = {"session", "fix", "photos", "-o", corrupted};
+    corrupt.insert(corrupt.end(), mistake.begin(), mistake.end());
+    const Outcome corrupting = Run(corrupt);
+    ASSERT_EQ(corrupting.exit_code, 0) << corrupting.err;
+    const nlohmann::json report = Report({"diagnose", corrupted, "--model", "nominal.yaml"});
     ASSERT_EQ(report["verdict"], "CHECK_DATA");
     EXPECT_TRUE(report["steps"].empty());
     const nlohmann::json problem = report["data_problems"][0];

@@ -33,7 +33,7 @@ absl::Status ValidateAddress(const std::string& address) {
   return absl::OkStatus();
 }
 
-// What keeps strangers from a server's memory: here the user asks for the user's own files.
+// What keeps unauthenticated clients from a server's memory: here the user asks for the user's own files.
 void RaiseLimits(service::Limits* limits) {
   constexpr int kLargest = 2047, kMany = 1 << 30;
   limits->max_request_mib = limits->max_upload_mib = limits->max_message_mib = kLargest;

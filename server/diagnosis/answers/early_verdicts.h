@@ -14,7 +14,7 @@ namespace touchstone::diagnosis {
 report::Diagnosis CheckDataReport(const DiagnosisInput& input, const DiagnosisContext& context,
                                   const std::vector<engine::DataProblem>& problems);
 
-// A refusal of the set (INVALID_ARGUMENT) with the command that mends the mistake behind it, where there is one; others stay.
+// A refusal of the set (INVALID_ARGUMENT) with the command that corrects the mistake behind it, where there is one; others stay.
 absl::Status WithFix(const absl::Status& refusal, const DiagnosisInput& input,
                      const DiagnosisContext& context);
 

@@ -1,4 +1,4 @@
-// Blunders first: before any physics is fitted, a list of discrete mistakes in the file is tried, each with the model
+// Data errors first: before any physics is fitted, a list of discrete mistakes in the file is tried, each with the model
 // as it is. A search for effects takes minutes on a file with two columns exchanged, and ends with four to seven
 // effects at their bounds, all of them nonsense.
 //

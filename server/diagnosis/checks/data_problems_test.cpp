@@ -11,8 +11,8 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
+#include "server/diagnosis/checks/corrupted_test_file.h"
 #include "server/diagnosis/checks/sampled_set.h"
-#include "server/diagnosis/checks/spoilt_test_file.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
@@ -21,7 +21,7 @@ using engine::ProblemKind;
 
 struct Case {
   const char* name;
-  MeasurementFix spoil;
+  MeasurementFix corrupt;
   ProblemKind kind;
   const char* detail;
   const char* fix;
@@ -95,7 +95,7 @@ TEST(DataProblems, EveryMistakeIsNamedBesidePhysicsThatIsMissing) {
     const DiagnosisInput right = MakeFile(Rig(seed));
     for (const Case& test : Cases()) {
       SCOPED_TRACE(testing::Message() << test.name << ", seed " << seed);
-      const auto problems = ProblemsOf(Spoilt(right, test.spoil));
+      const auto problems = ProblemsOf(Corrupted(right, test.corrupt));
       EXPECT_FALSE(problems.empty());
       if (problems.empty()) continue;
       const engine::DataProblem& problem = problems.front();
@@ -121,7 +121,7 @@ TEST(DataProblems, AMeshThatTheSetDoesNotNameIsFound) {
 
 TEST(DataProblems, AnOriginAtTheFootOfTheObjectIsFound) {
   const DiagnosisInput right = MakeFile(Rig());
-  const auto problems = ProblemsOf(Spoilt(right, [&](MeasurementSet* set) {
+  const auto problems = ProblemsOf(Corrupted(right, [&](MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row)
       set->target_m[row].z() -= right.surfaces.at(set->objects[set->object[row]])->bounds().min_m.z();
   }));
@@ -135,7 +135,7 @@ TEST(DataProblems, CopiesUnderNewNumbersAreCountedAndDropped) {
   rig.rounds = 1;
   const DiagnosisInput right = MakeFile(rig);
   EXPECT_TRUE(ProblemsOf(right).empty());
-  const auto problems = ProblemsOf(Spoilt(right, [](MeasurementSet* set) {
+  const auto problems = ProblemsOf(Corrupted(right, [](MeasurementSet* set) {
     const MeasurementSet once = *set;
     for (int row = 0; row < once.size(); ++row) {
       set->touch.push_back(1000 + row);
@@ -163,7 +163,7 @@ TEST(DataProblems, EqualRepeatsOfAModelWithoutNoiseOrOfCoarseTicksAreNoCopies) {
   quiet.sigma_us = 1e-9;  // as of a simulation: repeats agree
   DiagnosisInput input = MakeFile(quiet);
   input.model = std::make_shared<const model::Model>(model::NominalModel());
-  input = Spoilt(input, [](MeasurementSet* set) {
+  input = Corrupted(input, [](MeasurementSet* set) {
     for (double& time_s : set->time_s) time_s = std::round(time_s * 1e6) * 1e-6;
   });
   EXPECT_TRUE(ProblemsOf(input).empty());
@@ -177,7 +177,7 @@ TEST(DataProblems, EqualRepeatsOfAModelWithoutNoiseOrOfCoarseTicksAreNoCopies) {
 DiagnosisInput WithTicks(double tick_s, double share) {
   touches::HiddenRig rig = Rig();
   rig.rounds = 4;
-  return Spoilt(MakeFile(rig), [&](MeasurementSet* set) {
+  return Corrupted(MakeFile(rig), [&](MeasurementSet* set) {
     RandomStream random(3, RandomDomain::kDiagnosis, 1);
     for (int row = 0; row < set->size(); ++row) {
       const double step_s = random.Uniform() < share ? tick_s : 1e-6;
@@ -195,7 +195,7 @@ TEST(DataProblems, EqualRowsOnATickThatAShareOfTheTouchesHasAreNoCopies) {
 }
 
 TEST(DataProblems, CopiesOfUntidyTimesAreTakenForCopiesBesideTicks) {
-  const auto problems = ProblemsOf(Spoilt(WithTicks(0.02, 0.5), [](MeasurementSet* set) {
+  const auto problems = ProblemsOf(Corrupted(WithTicks(0.02, 0.5), [](MeasurementSet* set) {
     for (int row = 0; row < 18; ++row)
       for (int i = 0; i < 3; ++i) {
         set->time_s[row * 3 + i] = std::round(set->time_s[row * 3 + i] * 1e6 + 137 * i * (row + 3)) * 1e-6;
@@ -209,7 +209,7 @@ TEST(DataProblems, CopiesOfUntidyTimesAreTakenForCopiesBesideTicks) {
 TEST(DataProblems, RowsThatHoldTheTimesOfTheRowBeforeAreTold) {
   for (const double share : {0.03, 0.1, 0.25}) {
     int stale = 0;
-    const auto problems = ProblemsOf(Spoilt(MakeFile(Rig()), [&](MeasurementSet* set) {
+    const auto problems = ProblemsOf(Corrupted(MakeFile(Rig()), [&](MeasurementSet* set) {
       RandomStream random(5, RandomDomain::kDiagnosis, 1);
       for (int row = 1; row < set->size(); ++row) {
         if (random.Uniform() >= share) continue;
@@ -227,7 +227,7 @@ TEST(DataProblems, RowsThatHoldTheTimesOfTheRowBeforeAreTold) {
 
 // The file with every time that is later than `limit_s` after the first cut off there; of one finger, or (-1) of all.
 DiagnosisInput CutOff(const DiagnosisInput& right, double limit_s, int finger) {
-  return Spoilt(right, [&](MeasurementSet* set) {
+  return Corrupted(right, [&](MeasurementSet* set) {
     for (int row = 0; row < set->size(); ++row) {
       double* times_s = &set->time_s[row * 3];
       const double first_s = std::min({times_s[0], times_s[1], times_s[2]});
@@ -250,7 +250,7 @@ TEST(DataProblems, TimesThatAreCutOffAtALargestOneAreTold) {
 TEST(DataProblems, TicksMissedContactsAndRepeatsAreNotTakenForTimesThatAreCutOff) {
   EXPECT_TRUE(ProblemsOf(WithTicks(0.1, 1)).empty());
   EXPECT_TRUE(ProblemsOf(WithTicks(0.02, 1)).empty());
-  EXPECT_TRUE(ProblemsOf(Spoilt(MakeFile(Rig()), [](MeasurementSet* set) {
+  EXPECT_TRUE(ProblemsOf(Corrupted(MakeFile(Rig()), [](MeasurementSet* set) {
                 for (int row = 0; row < set->size(); ++row)
                   for (int i = 0; i < 3; ++i)
                     if (set->time_s[row * 3 + i] > set->time_s[row * 3 + (i + 1) % 3] + 0.3)
@@ -265,13 +265,13 @@ TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
   const DiagnosisInput right = MakeFile(rig);
   EXPECT_TRUE(FindRoundAtAnotherSpeed(right, nullptr).empty());
   const auto at_factor = [&](double factor, int round) {
-    return FindRoundAtAnotherSpeed(Spoilt(right,
-                                          [&](MeasurementSet* set) {
-                                            for (int row = 0; row < set->size(); ++row)
-                                              if (row / 24 % 4 == round)
-                                                for (int i = 0; i < 3; ++i)
-                                                  set->time_s[row * 3 + i] /= factor;
-                                          }),
+    return FindRoundAtAnotherSpeed(Corrupted(right,
+                                             [&](MeasurementSet* set) {
+                                               for (int row = 0; row < set->size(); ++row)
+                                                 if (row / 24 % 4 == round)
+                                                   for (int i = 0; i < 3; ++i)
+                                                     set->time_s[row * 3 + i] /= factor;
+                                             }),
                                    nullptr);
   };
   for (const double factor : {0.97, 1.03, 1.2}) {
@@ -285,7 +285,7 @@ TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
 }
 
 TEST(DataProblems, AColumnThatWasSortedAloneIsTold) {
-  const auto problems = ProblemsOf(Spoilt(MakeFile(Rig()), [](MeasurementSet* set) {
+  const auto problems = ProblemsOf(Corrupted(MakeFile(Rig()), [](MeasurementSet* set) {
     std::vector<double> column;
     for (int row = 0; row < set->size(); ++row) column.push_back(set->TimeS(row, 1));
     std::sort(column.begin(), column.end());
@@ -342,7 +342,7 @@ TEST(DataProblems, StrongPhysicsIsNoMistake) {
 
 TEST(DataProblems, TooFewTouchesBlameNoFile) {
   DiagnosisInput input = MakeFile(Rig());
-  input = Spoilt(input, [](MeasurementSet* set) {
+  input = Corrupted(input, [](MeasurementSet* set) {
     *set = *PartOf(*set, {0, 10, 20, 30, 40, 50}, 0);
     for (Eigen::Vector3d& lateral : set->lateral) lateral = -lateral;
   });

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/diagnosis/checks/spoilt_test_file.h"
+#include "server/diagnosis/checks/corrupted_test_file.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
@@ -22,10 +22,10 @@ DiagnosisInput FileOfRounds(uint64_t seed) {
 TEST(PartMistakes, FingersExchangedInSomeRoundsAreToldWithTheTouches) {
   for (const uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
-    const auto problems = ProblemsOf(Spoilt(FileOfRounds(seed), With([](auto* f) {
-                                              f->touches = {{24, 71}};
-                                              f->finger_order = {1, 0, 2};
-                                            })));
+    const auto problems = ProblemsOf(Corrupted(FileOfRounds(seed), With([](auto* f) {
+                                                 f->touches = {{24, 71}};
+                                                 f->finger_order = {1, 0, 2};
+                                               })));
     ASSERT_FALSE(problems.empty());
     EXPECT_EQ(problems[0].kind, ProblemKind::kFingerOrder);
     EXPECT_THAT(problems[0].fix, HasSubstr("--touches 2"));
@@ -40,7 +40,7 @@ TEST(PartMistakes, TouchesOfOneObjectUnderTheNameOfAnotherAreTold) {
     SCOPED_TRACE(seed);
     DiagnosisInput input = FileOfRounds(seed);
     // From here on no row is called lat10, but its mesh is there.
-    input = Spoilt(input, With([](auto* f) { f->rename_objects = {{"lat10", "lat20"}}; }));
+    input = Corrupted(input, With([](auto* f) { f->rename_objects = {{"lat10", "lat20"}}; }));
     const auto problems = ProblemsOf(input);
     ASSERT_FALSE(problems.empty());
     EXPECT_EQ(problems[0].kind, ProblemKind::kWrongMesh);
@@ -53,20 +53,20 @@ TEST(PartMistakes, TouchesOfOneObjectUnderTheNameOfAnotherAreTold) {
 }
 
 TEST(PartMistakes, TimesOfOneObjectInAnotherUnitAreTold) {
-  const auto problems = ProblemsOf(Spoilt(FileOfRounds(1), With([](auto* f) {
-                                            f->touches = {{96, 191}};
-                                            f->scale_times = 1e-3;
-                                          })));
+  const auto problems = ProblemsOf(Corrupted(FileOfRounds(1), With([](auto* f) {
+                                               f->touches = {{96, 191}};
+                                               f->scale_times = 1e-3;
+                                             })));
   ASSERT_FALSE(problems.empty());
   EXPECT_EQ(problems[0].kind, ProblemKind::kUnitsTime);
   EXPECT_THAT(problems[0].fix, HasSubstr("--scale-times 1000"));
 }
 
 TEST(PartMistakes, TimesThatAreOneRowOffFromSomewhereOnAreTold) {
-  const auto problems = ProblemsOf(Spoilt(FileOfRounds(2), With([](auto* f) {
-                                            f->touches = {{150, 287}};
-                                            f->shift_rows = 1;
-                                          })));
+  const auto problems = ProblemsOf(Corrupted(FileOfRounds(2), With([](auto* f) {
+                                               f->touches = {{150, 287}};
+                                               f->shift_rows = 1;
+                                             })));
   ASSERT_FALSE(problems.empty());
   EXPECT_EQ(problems[0].kind, ProblemKind::kRowShift);
   EXPECT_THAT(problems[0].fix, HasSubstr("--shift-rows=-1"));
@@ -74,10 +74,10 @@ TEST(PartMistakes, TimesThatAreOneRowOffFromSomewhereOnAreTold) {
 
 TEST(PartMistakes, NamesExchangedInOneRoundAreTwoPartsFixedOneAfterTheOther) {
   // lat10 holds touches 96 to 191, lat20 those from 192 on, 24 per round.
-  DiagnosisInput input = Spoilt(FileOfRounds(1), With([](auto* f) {
-                                  f->touches = {{120, 143}, {216, 239}};
-                                  f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
-                                }));
+  DiagnosisInput input = Corrupted(FileOfRounds(1), With([](auto* f) {
+                                     f->touches = {{120, 143}, {216, 239}};
+                                     f->rename_objects = {{"lat10", "lat20"}, {"lat20", "lat10"}};
+                                   }));
   const auto problems = ProblemsOf(input);
   ASSERT_EQ(problems.size(), 2u);
   for (const auto& problem : problems) EXPECT_EQ(problem.kind, ProblemKind::kObjectNames);
@@ -94,7 +94,7 @@ TEST(TwoMistakes, BothAreToldWithOneCommand) {
     const char* name;
     ProblemKind kinds[2];
     const char* options[2];
-    MeasurementFix spoil;
+    MeasurementFix corrupt;
   };
   const std::vector<Pair> pairs = {
       {"fingers and times",
@@ -117,7 +117,7 @@ TEST(TwoMistakes, BothAreToldWithOneCommand) {
   };
   for (const Pair& pair : pairs) {
     SCOPED_TRACE(pair.name);
-    const auto problems = ProblemsOf(Spoilt(FileOfRounds(3), pair.spoil));
+    const auto problems = ProblemsOf(Corrupted(FileOfRounds(3), pair.corrupt));
     ASSERT_EQ(problems.size(), 2u);
     std::vector<ProblemKind> kinds = {problems[0].kind, problems[1].kind};
     EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(pair.kinds[0], pair.kinds[1])) << problems[0].words;

@@ -1,4 +1,4 @@
-// The public sets (../shared/data/measurements): the two with a blunder are told, the others are not.
+// The public sets (../shared/data/measurements): the two with a data error are named, the others are not.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

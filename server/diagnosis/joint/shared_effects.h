@@ -3,7 +3,7 @@
 //
 // Each form of such an effect (on all objects, on each, on one) is fitted to the sum of all log likelihoods, with whatever
 // each kind of data shows beside it searched anew: a rest of the touches that an object's pose explains as well as a
-// tool's is decided by the photographs, and a camera that stands askew is no pose of its objects if the touches find these
+// tool's is decided by the photographs, and a camera that stands rotated is no pose of its objects if the touches find these
 // in their places. Where one kind wants another value than another, beyond chance, nothing is averaged: that is a
 // finding of its own, a conflict.
 #pragma once

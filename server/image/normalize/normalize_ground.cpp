@@ -174,7 +174,7 @@ float NoiseOf(const Plane& grey) {
   const auto noise_of = [](std::vector<float>* values) { return 1.4826f * MedianOf(values) / 6; };
   const float noise = noise_of(&sizes);
   // Black and white cut noise off: what most of a dark ground shows is less than the sensor's. Where enough of the picture
-  // is neither, that tells; but its texture is in it too, so that it is believed up to a limit.
+  // is neither, that tells; but its texture is in it too, so that it is used up to a limit.
   if (unclipped.size() < pixels / 20 || unclipped.size() > pixels / 2) return noise;
   return std::max(noise, std::min(noise_of(&unclipped), kMaxHiddenNoise));
 }

@@ -17,7 +17,7 @@ namespace touchstone::service {
 std::string OwnAddress(const std::string& listen, int port);
 
 // Asks the server's health check through its own port, over a new connection each time as a stranger's would be; with
-// TLS, whatever its certificate. Deaf is who does not answer at all, several times in a row, within a time that is long for
+// TLS, whatever its certificate. Unreachable is who does not answer at all, several times in a row, within a time that is long for
 // a busy machine; a refusal is an answer. It counts questions and not hours, so a clock that jumps or a machine that slept
 // changes nothing.
 class SelfProbe {

@@ -1,5 +1,5 @@
 // Takes connections for a gRPC server, and no more than the process has files for. gRPC's own listener gives up for good
-// when accept fails for want of a file, so that as many silent connections as there are files make it deaf; this one
+// when accept fails for want of a file, so that as many silent connections as there are files make it unreachable; this one
 // closes what is too much and keeps a part of the files for everything else. Between the sockets and gRPC stands a relay
 // that counts frames (connection_relay.h).
 #pragma once

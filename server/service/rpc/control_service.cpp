@@ -34,7 +34,7 @@ grpc::Status ControlService::Stop(grpc::ServerContext* context, const v1::StopRe
                                   v1::StopResponse* response) {
   const uint32_t running = resources_->running_requests;
   ++resources_->stop_count;
-  // A stop is never refused, so what is too long or no text is mended.
+  // A stop is never refused, so what is too long or no text is shortened or replaced.
   spdlog::warn(
       "stop from {} at {}: {}; {} requests under way end",
       WithCaller(request->holder().empty() ? "somebody" : Printable(request->holder(), kMaxHolderBytes),

@@ -58,7 +58,7 @@ constexpr double kGraceS = 10;
 void EndAfter(double seconds) {
   std::thread([seconds] {
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-    std::_Exit(kExitDeaf);
+    std::_Exit(kExitUnreachable);
   }).detach();
 }
 
@@ -104,22 +104,22 @@ int ReportStartError(const char* program, const absl::Status& status) {
 
 bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins) {
   AnnounceListening(options.listen, port);
-  std::atomic<bool> deaf{false};
+  std::atomic<bool> unreachable{false};
   std::unique_ptr<SelfProbe> probe;
   if (options.self_probe_s > 0)
     probe = std::make_unique<SelfProbe>(OwnAddress(options.listen, port), !options.access.tls_cert.empty(),
                                         options.self_probe_s, options.self_probe_s, [&] {
-                                          deaf = true;
+                                          unreachable = true;
                                           EndAfter(options.drain_s + kGraceS);
                                           ::kill(::getpid(), SIGTERM);
                                         });
   const int signal = WaitForStopSignal();
   probe.reset();
-  if (deaf)
+  if (unreachable)
     spdlog::critical("nobody can reach this process any more: it ends with status {}, to be started anew",
-                     kExitDeaf);
+                     kExitUnreachable);
   spdlog::info("signal {}: {} for up to {} s", signal, what_begins, options.drain_s);
-  return deaf;
+  return unreachable;
 }
 
 void LogStopped() {

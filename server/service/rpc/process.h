@@ -23,12 +23,12 @@ void AnnounceListening(const std::string& listen, int port);
 
 // What went wrong, on stderr, and the exit status for it: 3 where something is unavailable, else 2.
 int ReportStartError(const char* program, const absl::Status& status);
-// Until a signal says otherwise, or until the process is deaf (self_probe.h); logs what then begins. Whether it was deaf:
+// Until a signal says otherwise, or until the process is unreachable (self_probe.h); logs what then begins. Whether it was unreachable:
 // then it ends within drain_s and a little, whatever hangs.
 bool ServeUntilSignal(const ServerOptions& options, int port, const char* what_begins);
 void LogStopped();
-// Exit status of a deaf process: start it anew.
-inline constexpr int kExitDeaf = 70;
+// Exit status of a unreachable process: start it anew.
+inline constexpr int kExitUnreachable = 70;
 // EX_OSERR: it gets no more memory where a call could not be refused instead.
 inline constexpr int kExitOutOfMemory = 71;
 
@@ -46,10 +46,10 @@ int RunServer(const char* program, const absl::StatusOr<Flags>& flags, OptionsOf
   RaiseFileLimit();
   auto server = start(*flags);
   if (!server.ok()) return ReportStartError(program, server.status());
-  const bool deaf = ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);
+  const bool unreachable = ServeUntilSignal(options_of(*flags), (*server)->port(), what_a_signal_begins);
   (*server)->Drain();
   LogStopped();
-  return deaf ? kExitDeaf : 0;
+  return unreachable ? kExitUnreachable : 0;
 }
 
 }  // namespace touchstone::service

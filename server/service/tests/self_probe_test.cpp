@@ -21,9 +21,9 @@ namespace touchstone::service {
 namespace {
 
 // A port on which the system takes connections and nobody ever looks at them.
-class DeafListener {
+class SilentListener {
  public:
-  DeafListener() : file_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  SilentListener() : file_(::socket(AF_INET, SOCK_STREAM, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -33,7 +33,7 @@ class DeafListener {
     ::getsockname(file_, reinterpret_cast<sockaddr*>(&address), &size);
     address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
   }
-  ~DeafListener() { ::close(file_); }
+  ~SilentListener() { ::close(file_); }
   const std::string& address() const { return address_; }
   // Until somebody has connected.
   void WaitForACaller() const {
@@ -47,7 +47,7 @@ class DeafListener {
 };
 
 TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
-  const DeafListener listener;
+  const SilentListener listener;
   ManualClock clock;
   std::atomic<int> ends{0};
   std::promise<void> ended;
@@ -70,7 +70,7 @@ TEST(SelfProbe, EndsWhatTakesConnectionsAndAnswersNone) {
 // gRPC by itself gives up connecting after 20 s, which is no answer either.
 TEST(SelfProbe, EndsWhatIsSilentForLongerThanGrpcWouldTryToConnect) {
   TOUCHSTONE_SECOND_TIER("long: gRPC's own limit is 20 s of the machine's time");
-  const DeafListener listener;
+  const SilentListener listener;
   std::promise<void> ended;
   const SelfProbe probe(
       listener.address(), false, 0.05, 21, [&] { ended.set_value(); }, 1);
@@ -79,7 +79,7 @@ TEST(SelfProbe, EndsWhatIsSilentForLongerThanGrpcWouldTryToConnect) {
 
 // A proxy of the environment says nothing about this server, here one that refuses.
 TEST(SelfProbe, AsksThisMachineAndNoProxy) {
-  const DeafListener listener;
+  const SilentListener listener;
   ManualClock clock;
   std::promise<void> ended;
   ::setenv("http_proxy", "http://127.0.0.1:1", 1);
@@ -94,7 +94,7 @@ TEST(SelfProbe, AsksThisMachineAndNoProxy) {
 }
 
 TEST(SelfProbe, ThatIsOverDoesNotWaitForItsAnswer) {
-  const DeafListener listener;
+  const SilentListener listener;
   std::atomic<int> ends{0};
   const auto begin = std::chrono::steady_clock::now();
   {

@@ -53,7 +53,7 @@ struct Placement {
 };
 Placement PlacementOf(const Cause& remounted, uint64_t seed, int object, int round);
 
-// By how much the tool stands askew at a pose, as a rotation about the target.
+// By how much the tool stands rotated at a pose, as a rotation about the target.
 Eigen::Matrix3d TiltOf(const Cause& pose_error, uint64_t seed, int pose, const Eigen::Vector3d& approach,
                        const Eigen::Vector3d& lateral);
 

@@ -132,8 +132,8 @@ TEST(HiddenCause, APoseKeepsItsTilt) {
     const auto added = Added(error, command);
     // The angle between the row and the surface: its tangent is what the outer fingers show, per 30 mm. A plate is
     // met at the distance of the target, turned by the tilt in the plane of row and approach.
-    const Eigen::Matrix3d askew = TiltOf(error, 1, pose, command.approach, command.lateral);
-    const Eigen::Vector3d a = askew * command.approach, s = askew * command.lateral;
+    const Eigen::Matrix3d rotated = TiltOf(error, 1, pose, command.approach, command.lateral);
+    const Eigen::Vector3d a = rotated * command.approach, s = rotated * command.lateral;
     const double slope = -s.z() / a.z();  // of travel along the row
     EXPECT_NEAR(added[2] - added[0], 60 * (slope - std::tan(kLean)), 1e-9);
     squares += std::pow((added[2] - added[0]) / 60 * std::pow(std::cos(kLean), 2), 2);

@@ -159,7 +159,7 @@ Set Played(const Scenario& scenario, const Protocol& protocol, uint64_t seed) {
   Play(scenario, protocol, seed, &set.exact_time_us, &tangents);
   set.reported_us = Report(scenario, seed, protocol, set.exact_time_us, tangents);
   set.csv = Csv(scenario, protocol, set.reported_us);
-  for (const Blunder& blunder : scenario.blunders) set.csv = WithBlunder(set.csv, blunder);
+  for (const DataError& data_error : scenario.data_errors) set.csv = WithDataError(set.csv, data_error);
   set.model_yaml = NominalYaml(scenario);
   return set;
 }

@@ -86,8 +86,8 @@ const Cause* Rig::Find(CauseKind kind) const {
 std::vector<Rig::Landing> Rig::Land(const Command& command) const {
   Vec a = command.approach, across = command.lateral;
   if (const Cause* error = Find(CauseKind::kPoseError); error != nullptr && command.pose >= 0) {
-    const Eigen::Matrix3d askew = TiltOf(*error, seed_, command.pose, a, across);
-    a = askew * a, across = askew * across;
+    const Eigen::Matrix3d rotated = TiltOf(*error, seed_, command.pose, a, across);
+    a = rotated * a, across = rotated * across;
   }
   // The real row of fingers.
   const double yaw = Value("tool_yaw") * kRadians;

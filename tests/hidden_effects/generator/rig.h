@@ -18,7 +18,7 @@ std::mt19937_64 Stream(uint64_t seed, const char* purpose);
 
 class Rig {
  public:
-  // `seed` draws the bumps, and how objects and poses stand askew.
+  // `seed` draws the bumps, and how objects and poses stand rotated.
   Rig(const Scenario& scenario, uint64_t seed);
 
   struct Finger {

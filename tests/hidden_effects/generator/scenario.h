@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/hidden_effects/generator/blunders.h"
 #include "tests/hidden_effects/generator/causes.h"
+#include "tests/hidden_effects/generator/data_errors.h"
 #include "tests/hidden_effects/generator/solid.h"
 
 namespace touchstone::hidden {
@@ -38,15 +38,15 @@ struct Scenario {
   std::vector<Hidden> hidden;
   std::vector<Unlisted> unlisted;
   std::vector<Cause> causes;
-  std::vector<Blunder> blunders;  // mistakes in the file, in this order
-  std::vector<Hidden> in_model;   // what the nominal model file has besides the noise
-  bool noise_in_model = true;     // whether the nominal model file has gaussian_noise
-  double model_sigma_us = 0;      // what the nominal model claims; 0: sigma_us
-  double outlier_share = 0;       // of the fingers' times,
-  double outlier_us = 100'000;    // off by up to this much
-  double missing_share = 0;       // of the fingers' times
-  bool with_poses = true;         // false: only objects and times are written
-  bool with_temperature = false;  // a column cov_temperature
+  std::vector<DataError> data_errors;  // mistakes in the file, in this order
+  std::vector<Hidden> in_model;        // what the nominal model file has besides the noise
+  bool noise_in_model = true;          // whether the nominal model file has gaussian_noise
+  double model_sigma_us = 0;           // what the nominal model claims; 0: sigma_us
+  double outlier_share = 0;            // of the fingers' times,
+  double outlier_us = 100'000;         // off by up to this much
+  double missing_share = 0;            // of the fingers' times
+  bool with_poses = true;              // false: only objects and times are written
+  bool with_temperature = false;       // a column cov_temperature
 };
 
 // The order of the catalogue's numbers: a scalar has 1, a vector 3, a parameter per finger `fingers`.

@@ -1,7 +1,7 @@
 """The arms of the benchmark: what is hidden in the sets of each. Seeds of tuning and of the table share no number."""
 import dataclasses
 
-import blunders
+import data_errors
 import sets
 import strengths
 import unlisted
@@ -115,11 +115,11 @@ def _beside(name):
     return make
 
 
-def _blunder(name):
+def _data_error(name):
     def make(seed):
         files = _nothing(seed)
-        files.truth.arm = "blunder " + name
-        return blunders.make(name, files, sets.stream(seed, "blunder"))
+        files.truth.arm = "data error " + name
+        return data_errors.make(name, files, sets.stream(seed, "blunder"))
 
     return make
 
@@ -131,7 +131,7 @@ ARMS = (
     + [Arm("pair " + " + ".join(p), "pairs", 4, _pair(p)) for p in PAIRS]
     + [Arm(f"albedo {rms:g}", "albedo", 15, _albedo(rms, length)) for rms, length in ALBEDO]
     + [Arm(f"{s} {n}", "unlisted", 10, _unlisted(n, s)) for n in unlisted.NAMES for s in UNLISTED_SIGMAS]
-    + [Arm("blunder " + n, "blunders", 6, _blunder(n)) for n in blunders.NAMES]
+    + [Arm("data error " + n, "data errors", 6, _data_error(n)) for n in data_errors.NAMES]
     + [Arm(f"realistic {e}", "realistic", 8, _one(e, "realistic")) for e in strengths.RESPONSES]
     + [Arm("overexposed", "realistic", 8, _overexposed)]
     + [Arm(f"exposure beside {n}", "unlisted", 6, _beside(n)) for n in ("dirt", "reflection")]

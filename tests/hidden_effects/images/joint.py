@@ -16,8 +16,8 @@ SPACING_MM, STANDOFF_MM, SPEED_MM_S = 30.0, 60.0, 20.0
 SIGMA_US = 3000.0
 
 
-class Askew(solids.Solid):
-    """The solid as it lies; light is placed round where it is believed to lie."""
+class Rotated(solids.Solid):
+    """The solid as it lies; light is placed round where the model has it."""
 
     nominal: Optional[solids.Solid] = None
 
@@ -33,11 +33,11 @@ class Askew(solids.Solid):
 def moved(solid, translation_mm=(0, 0, 0), rotation_deg=(0, 0, 0)):
     """Turned about the mesh's origin, then moved (DESIGN, section 5: object_pose)."""
     turn, _ = cv2.Rodrigues(np.radians(np.asarray(rotation_deg, float)))
-    askew = Askew(**{field.name: copy.copy(getattr(solid, field.name)) for field in dataclasses.fields(solid)})
-    askew.vertices = solid.vertices @ turn.T + np.asarray(translation_mm, float)
-    askew.normals = solid.normals @ turn.T
-    askew.nominal = solid
-    return askew
+    rotated = Rotated(**{field.name: copy.copy(getattr(solid, field.name)) for field in dataclasses.fields(solid)})
+    rotated.vertices = solid.vertices @ turn.T + np.asarray(translation_mm, float)
+    rotated.normals = solid.normals @ turn.T
+    rotated.nominal = solid
+    return rotated
 
 
 def distances(solid, starts, direction):

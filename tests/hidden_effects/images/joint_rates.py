@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Objects put down askew, touched and photographed, over seeds: does a joint diagnosis name it, is it tighter than either
+"""Objects put down rotated, touched and photographed, over seeds: does a joint diagnosis name it, is it tighter than either
 part, do its intervals cover the truth, and is what only touches show (a turned tool) told as shown by touches alone?
 
     build/venv/bin/python tests/hidden_effects/images/joint_rates.py --seeds 12 --minutes 5
@@ -54,14 +54,14 @@ def steps(report):
 
 def marks(program, seed):
     pose = draw_pose(seed)
-    askew = diagnosed(program, seed, pose)
+    rotated = diagnosed(program, seed, pose)
     turned = diagnosed(program, seed, yaw_deg=1.0)
-    row = {"seed": seed, "askew": steps(askew), "turned": steps(turned), "values": []}
-    if row["askew"] == [("object_pose", ["TOUCHES", "PHOTOGRAPHS"])]:
+    row = {"seed": seed, "rotated": steps(rotated), "turned": steps(turned), "values": []}
+    if row["rotated"] == [("object_pose", ["TOUCHES", "PHOTOGRAPHS"])]:
         truth = [*pose["translation_mm"], *pose["rotation_deg"]]
         row["values"] = [{"off": v["value"] - true, "std_error": v["std_error"],
                           "alone": [each["std_error"] for each in v["alone"]]}
-            for v, true in zip(askew["steps"][0]["parameters"], truth)]
+            for v, true in zip(rotated["steps"][0]["parameters"], truth)]
     return row
 
 
@@ -80,7 +80,7 @@ def main():
     values = [v for row in rows for v in row["values"]]
     either = [min(v["alone"]) / v["std_error"] for v in values]
     print(f"{len(rows)} seeds of {given.seeds}")
-    print("askew named object_pose alone, shown by both:", sum(bool(row["values"]) for row in rows))
+    print("rotated named object_pose alone, shown by both:", sum(bool(row["values"]) for row in rows))
     print("turned tool named tool_yaw alone, shown by touches:",
           sum(row["turned"] == [("tool_yaw", ["TOUCHES"])] for row in rows))
     if values:

@@ -2,7 +2,7 @@
 import dataclasses
 import math
 
-import blunders
+import data_errors
 
 CONFIDENT = 0.9
 OVER_FLOOR = 1.1
@@ -127,9 +127,9 @@ def judge(report, truth, seconds):
 
     strong = truth["strength"] == "strong"
     wrong_values = [r["effect"] for r in report.get("refitted", []) if r["effect"] not in NOISE]
-    if truth["blunder"]:
+    if truth["data_error"]:
         mark.right = mark.verdict == "CHECK_DATA" and mistakes[:1] != [] and \
-            mistakes[0] in blunders.KINDS[truth["blunder"]]
+            mistakes[0] in data_errors.KINDS[truth["data_error"]]
         mark.confidently_wrong = not mark.right and (mark.verdict in ("CHECK_DATA", "ADEQUATE") or bool(blames))
         mark.honest = mark.right or not mark.confidently_wrong
         return mark

@@ -93,7 +93,7 @@ TARGETS: dict[str, list[tuple]] = {  # group -> (figure, target in %, whether at
               ("confidently wrong", None, True)],
     "albedo": [("right", None, False), ("confidently wrong", None, True)],
     "unlisted": [("right", None, False), ("confidently wrong", 2, True)],
-    "blunders": [("right", None, False), ("confidently wrong", None, True)],
+    "data errors": [("right", None, False), ("confidently wrong", None, True)],
 }
 FIGURES = {
     "false claim": lambda m: m.false_claim,
@@ -219,7 +219,7 @@ def main():
                                           "mark": dataclasses.asdict(mark), "said": said}, default=str) + "\n")
             if options.verbose:
                 print(f"{'ok   ' if mark.right else 'WRONG' if mark.confidently_wrong else 'not  '} {name} seed {seed}: "
-                      f"{truth['effects'] or truth['unlisted'] or truth['blunder']} -> {mark.verdict} {mark.claims} "
+                      f"{truth['effects'] or truth['unlisted'] or truth['data_error']} -> {mark.verdict} {mark.claims} "
                       f"p {mark.probability:.3f} errors {[round(float(e), 1) for e in mark.errors]} "
                       f"floor x {mark.over_floor:.3f} {mark.seconds:.1f} s ({mark.cpu_seconds:.1f} of processors) {said}",
                       file=sys.stderr, flush=True)

@@ -76,14 +76,14 @@ def make_scene(seed, pictures=20, repeats=None):
 
 @dataclasses.dataclass
 class Truth:
-    """What is hidden: `effects` by name with their values in the units of files; `unlisted` and `blunder` by name."""
+    """What is hidden: `effects` by name with their values in the units of files; `unlisted` and `data_error` by name."""
 
     arm: str
     seed: int
     strength: str = ""
     effects: dict = dataclasses.field(default_factory=dict)
     unlisted: str = ""
-    blunder: str = ""
+    data_error: str = ""
     noise: tuple = NOMINAL_NOISE
     floor_grey: float = 0
     notes: dict = dataclasses.field(default_factory=dict)

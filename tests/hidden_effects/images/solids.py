@@ -108,7 +108,7 @@ def _grid_triangles(rows, columns):
 
 def torus(name="torus", ring=52.0, tube=24.0, rows=96, columns=48):
     u, v = np.meshgrid(2 * np.pi * np.arange(rows) / rows, 2 * np.pi * np.arange(columns) / columns, indexing="ij")
-    # Standing askew, and not quite round, so that no view is like another.
+    # Tilted, and not quite round, so that no view is like another.
     r = ring + tube * (1 + 0.2 * np.cos(u)) * np.cos(v)
     points = np.stack([r * np.cos(u), 1.15 * r * np.sin(u), tube * np.sin(v) + 10 * np.sin(u)], -1).reshape(-1, 3)
     return make_solid(name, points, _grid_triangles(rows, columns))

@@ -8,7 +8,7 @@ import pytest
 cv2 = pytest.importorskip("cv2", reason="opencv-python-headless is not installed (deploy/python-packages.txt)")
 
 import arms  # noqa: E402
-import blunders  # noqa: E402
+import data_errors  # noqa: E402
 import judge  # noqa: E402
 import sets  # noqa: E402
 import strengths  # noqa: E402
@@ -70,11 +70,11 @@ def test_albedo_is_smooth_and_has_the_spread_that_is_asked():
     assert np.abs(field(points + [1.0, 0, 0]) - values).max() < 0.01
 
 
-@pytest.mark.parametrize("name", blunders.NAMES)
+@pytest.mark.parametrize("name", data_errors.NAMES)
 def test_mistakes_change_the_set_and_are_written(name, tmp_path):
     files = sets.make_files(SCENE, sets.Truth("x", 2), lambda n: sets.make_physics({}))
     before = copy.deepcopy(files)
-    blunders.make(name, files, np.random.default_rng(3))
+    data_errors.make(name, files, np.random.default_rng(3))
     sets.write_set(before, tmp_path / "before")
     sets.write_set(files, tmp_path / "after")
     texts = lambda folder: [(tmp_path / folder / f).read_text() for f in ("images.csv", "camera.yaml")]
@@ -84,7 +84,7 @@ def test_mistakes_change_the_set_and_are_written(name, tmp_path):
 
 
 def a_truth(**fields):
-    return {"effects": {}, "unlisted": "", "blunder": "", "strength": "realistic", **fields}
+    return {"effects": {}, "unlisted": "", "data_error": "", "strength": "realistic", **fields}
 
 
 def a_step(effect, value=1.0, error=0.1, name="stops", probability=0.99, **fields):
@@ -128,7 +128,7 @@ def test_unlisted_causes_must_be_left_nameless_and_mistakes_named():
     assert judge.judge({"verdict": "UNEXPLAINED"}, dirt, 1).right
     assert judge.judge({"verdict": "ADEQUATE"}, dirt, 1).confidently_wrong
     assert judge.judge({"verdict": "MISSING_EFFECTS", "steps": [a_step("vignetting")]}, dirt, 1).confidently_wrong
-    mirrored = a_truth(blunder="mirrored")
+    mirrored = a_truth(data_error="mirrored")
     named = lambda kind: {"verdict": "CHECK_DATA", "data_problems": [{"kind": kind.upper()}]}
     assert judge.judge(named("mirrored"), mirrored, 1).right
     assert judge.judge(named("wrong_object"), mirrored, 1).confidently_wrong

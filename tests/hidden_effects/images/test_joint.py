@@ -49,7 +49,7 @@ def effects(report):
 
 
 @trial
-def test_objects_that_lie_askew_are_found_by_both_and_tighter_than_by_either(tmp_path):
+def test_objects_that_lie_rotated_are_found_by_both_and_tighter_than_by_either(tmp_path):
     report = diagnosed(tmp_path, POSE, POSE)
     assert effects(report) == [("object_pose", ["TOUCHES", "PHOTOGRAPHS"])], report["summary"]
     truth = [*POSE["translation_mm"], *POSE["rotation_deg"]]

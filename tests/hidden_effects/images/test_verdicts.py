@@ -6,7 +6,7 @@ import pytest
 
 cv2 = pytest.importorskip("cv2", reason="opencv-python-headless is not installed (deploy/python-packages.txt)")
 
-import blunders  # noqa: E402
+import data_errors  # noqa: E402
 import judge  # noqa: E402
 import score  # noqa: E402
 import sets  # noqa: E402
@@ -20,14 +20,14 @@ PICTURES = 6  # of each object: a third of the time that a whole set takes
 pytestmark = pytest.mark.skipif(not PROGRAM.exists(), reason=f"{PROGRAM} is not built")
 
 
-def marked(folder, effects=None, blunder="", seed=SEED):
+def marked(folder, effects=None, data_error="", seed=SEED):
     """The report on a set and its mark."""
     scene = sets.make_scene(seed, pictures=PICTURES, repeats=1)
     effects = {name: strengths.realistic(name, scene) for name in effects or ()}
     truth = sets.Truth("test", seed, "realistic", effects)
     files = sets.make_files(scene, truth, lambda number: sets.make_physics(effects))
-    if blunder:
-        blunders.make(blunder, files, sets.stream(seed, "blunder"))
+    if data_error:
+        data_errors.make(data_error, files, sets.stream(seed, "blunder"))
     sets.write_set(files, folder / "set")
     sets.write_meshes(folder / "meshes")
     sets.write_model(folder / "nominal.yaml")
@@ -56,8 +56,8 @@ def test_a_hidden_effect_is_named_first_and_its_error_falls_to_the_floor(effect,
     assert all(abs(error) < 4 for error in mark.errors) and mark.errors
 
 
-@pytest.mark.parametrize("blunder", ["mirrored", pytest.param("focal_factor", marks=trial)])
-def test_a_mistake_in_the_files_is_found_before_any_physics(blunder, tmp_path):
-    report, mark, _ = marked(tmp_path, blunder=blunder)
+@pytest.mark.parametrize("data_error", ["mirrored", pytest.param("focal_factor", marks=trial)])
+def test_a_mistake_in_the_files_is_found_before_any_physics(data_error, tmp_path):
+    report, mark, _ = marked(tmp_path, data_error=data_error)
     assert mark.right, (mark.verdict, report["data_problems"])
     assert not report["steps"]

@@ -76,7 +76,7 @@ Answer AnswerFor(const Arm& arm, const Scenario& truth) {
     answer.covariates = CovariatesOf(cause.kind);
     if (const std::string name = NameOf(cause.kind); !name.empty()) answer.names.push_back(name);
   }
-  for (const Blunder& blunder : truth.blunders) answer.problems = ProblemKinds(blunder);
+  for (const DataError& data_error : truth.data_errors) answer.problems = ProblemKinds(data_error);
   return answer;
 }
 

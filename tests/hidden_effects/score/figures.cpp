@@ -163,7 +163,7 @@ bool IsRight(const Arm& arm, const Scenario& truth, const v1::Report& report, co
       return OldValueIsRight(truth, report);
     case Kind::kWrongNoise:
       return WrongNoiseIsRight(truth, report);
-    case Kind::kBlunder:
+    case Kind::kDataError:
       return report.verdict() == v1::Report::CHECK_DATA && report.data_problems_size() > 0 &&
              IsIn(answer.problems, KindOf(report.data_problems(0)));
     case Kind::kTooFew:
@@ -173,7 +173,8 @@ bool IsRight(const Arm& arm, const Scenario& truth, const v1::Report& report, co
 }
 
 bool NothingToFind(const Arm& arm, const Scenario& truth) {
-  return truth.hidden.empty() && truth.unlisted.empty() && truth.causes.empty() && truth.blunders.empty() &&
+  return truth.hidden.empty() && truth.unlisted.empty() && truth.causes.empty() &&
+         truth.data_errors.empty() &&
          (arm.kind == Kind::kNothing || arm.kind == Kind::kEffects || arm.kind == Kind::kNoPoses);
 }
 

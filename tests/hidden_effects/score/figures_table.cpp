@@ -62,7 +62,7 @@ std::string OverallLines(const Rates& rates) {
   const auto all = [](const Arm&) { return true; };
   const auto listed = [](const Arm& arm) { return arm.listed(); };
   const auto unlisted = [](const Arm& arm) { return !arm.listed(); };
-  const auto blunder = [](const Arm& arm) { return arm.kind == Kind::kBlunder; };
+  const auto data_error = [](const Arm& arm) { return arm.kind == Kind::kDataError; };
   const auto timed = [](const Arm& arm) { return arm.depends_on_time && arm.strength != Strength::kWeak; };
   const auto curve = [](const Arm& arm) { return !arm.listed() && arm.strength != Strength::kWeak; };
   const std::vector<Line> lines = {
@@ -71,7 +71,7 @@ std::string OverallLines(const Rates& rates) {
        kMaxWrongPerArm, true},
       {"confidently wrong, the catalogue's arms", Over(rates, "confidently wrong", listed), kMaxWrongOverall,
        true},
-      {"blunders named", Over(rates, "right", blunder), 0.95, false},
+      {"data errors named", Over(rates, "right", data_error), 0.95, false},
       {"time-dependent causes unexplained, with time first (not weak)",
        Over(rates, "unexplained by time", timed), 0.90, false},
       {"lookup halves the misfit on fresh touches (not weak)", Over(rates, "lookup halves the misfit", curve),

@@ -175,7 +175,7 @@ TEST(Figures, ErrorsOfEachPoseHaveNoCovariate) {
 
 TEST(Figures, AMistakeInTheFileIsRightByItsKind) {
   Scenario truth;
-  truth.blunders = {{BlunderKind::kFingersPermuted, 0, {1, 0, 2}}};
+  truth.data_errors = {{DataErrorKind::kFingersPermuted, 0, {1, 0, 2}}};
   v1::Report report = Says(v1::Report::CHECK_DATA);
   report.add_data_problems()->set_kind(v1::DataProblem::FINGER_ORDER);
   EXPECT_EQ(Letters("fingers permuted, strong", truth, report), "RH");

@@ -242,7 +242,7 @@ std::vector<Mark> Judge(const Arm& arm, const Scenario& truth, const v1::Report&
     case Kind::kBadPrint:
     case Kind::kOldValue:
     case Kind::kWrongNoise:
-    case Kind::kBlunder:
+    case Kind::kDataError:
     case Kind::kTooFew:
       break;  // only the figures of figures.h
   }
@@ -275,7 +275,7 @@ std::string TruthInWords(const Scenario& truth) {
   for (const Unlisted& unlisted : truth.unlisted)
     add("unlisted " + unlisted.name, {unlisted.k_mm, unlisted.second});
   for (const Cause& cause : truth.causes) add(InWords(cause), {});
-  for (const Blunder& blunder : truth.blunders) add("mistake: " + InWords(blunder), {});
+  for (const DataError& data_error : truth.data_errors) add("mistake: " + InWords(data_error), {});
   for (const Hidden& given : truth.in_model) add("in the model: " + given.effect, given.values);
   return words.empty() ? "nothing" : words;
 }

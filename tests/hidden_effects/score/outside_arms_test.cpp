@@ -76,7 +76,7 @@ TEST(OutsideArms, ModelsCanBeReadAndSomethingIsWrongWithEverySet) {
     const Scenario scenario = arm.draw(FewObjects(), seed);
     const Set set = Generate(scenario, seed);
     EXPECT_TRUE(model::ParseModel(set.model_yaml, "n", effects::Catalogue()).ok()) << set.model_yaml;
-    EXPECT_FALSE(scenario.causes.empty() && scenario.blunders.empty() && scenario.hidden.empty() &&
+    EXPECT_FALSE(scenario.causes.empty() && scenario.data_errors.empty() && scenario.hidden.empty() &&
                  scenario.in_model.empty() && scenario.model_sigma_us == 0)
         << arm.name;
     if (arm.kind == Kind::kTooFew) {

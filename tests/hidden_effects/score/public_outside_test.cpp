@@ -39,10 +39,10 @@ Scenario PublicCause(Cause cause) {
   return truth;
 }
 
-Scenario PublicEffect(Hidden effect, std::vector<Blunder> blunders) {
+Scenario PublicEffect(Hidden effect, std::vector<DataError> data_errors) {
   Scenario truth;
   truth.hidden = {std::move(effect)};
-  truth.blunders = std::move(blunders);
+  truth.data_errors = std::move(data_errors);
   return truth;
 }
 
@@ -64,9 +64,9 @@ std::vector<PublicSet> PublicOutsideSets() {
        false},
       {"beyond_bound", "beyond its bound, realistic", PublicEffect({"object_push", {8}}, {}), true},
       {"fingers_permuted", "fingers permuted, strong",
-       PublicEffect(tips, {{BlunderKind::kFingersPermuted, 0, {1, 2, 0}}}), true},
+       PublicEffect(tips, {{DataErrorKind::kFingersPermuted, 0, {1, 2, 0}}}), true},
       {"objects_swapped", "objects swapped, strong",
-       PublicEffect(tips, {{BlunderKind::kObjectsSwapped, 0, {2, 3}}}), true},
+       PublicEffect(tips, {{DataErrorKind::kObjectsSwapped, 0, {2, 3}}}), true},
   };
 }
 

@@ -74,7 +74,7 @@ void JudgeOutcome(const TestObjects& objects, Outcome* out) {
   // Without a report every question is answered wrongly, but nothing was claimed.
   for (Mark& mark : out->marks) mark.yes = IsBad(mark.measure);
   // A file that is refused, with the reason, misleads nobody.
-  const bool refused = arm.kind == Kind::kBlunder && !out->timed_out;
+  const bool refused = arm.kind == Kind::kDataError && !out->timed_out;
   out->figures = {{"right", false}, {"honest", refused}, {"confidently wrong", false}};
   if (arm.depends_on_time) out->figures.push_back({"unexplained by time", false});
   if (IsACurve(arm, truth)) out->figures.push_back({"lookup halves the misfit", false});

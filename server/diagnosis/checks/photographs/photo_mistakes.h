@@ -1,4 +1,4 @@
-// Blunders of image sets first: before any physics is fitted, a list of discrete mistakes is tried, each with the model
+// Data errors of image sets first: before any physics is fitted, a list of discrete mistakes is tried, each with the model
 // as it is (data_problems.h does the same for touches).
 //
 // What a trial measures is the part of a picture's variation that the expected picture does not explain, whatever the

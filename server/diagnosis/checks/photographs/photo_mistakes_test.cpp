@@ -20,12 +20,12 @@ images::HiddenCamera SmallCamera() {
   return rig;
 }
 
-DiagnosisInput Spoilt(const DiagnosisInput& input, const ImageSetFix& mistake) {
-  DiagnosisInput spoilt = input;
+DiagnosisInput Corrupted(const DiagnosisInput& input, const ImageSetFix& mistake) {
+  DiagnosisInput corrupted = input;
   auto set = std::make_shared<session::ImageSet>(*input.images);
   EXPECT_TRUE(session::ApplyFix(mistake, set.get()).ok());
-  spoilt.images = set;
-  return spoilt;
+  corrupted.images = set;
+  return corrupted;
 }
 
 std::vector<PhotoMistake> Found(const DiagnosisInput& input) {
@@ -36,13 +36,13 @@ std::vector<PhotoMistake> Found(const DiagnosisInput& input) {
 void ExpectFound(const ImageSetFix& mistake, ProblemKind kind) {
   SCOPED_TRACE(session::FixOptions(mistake));
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
-  const DiagnosisInput spoilt = Spoilt(input, mistake);
-  const std::vector<PhotoMistake> found = Found(spoilt);
+  const DiagnosisInput corrupted = Corrupted(input, mistake);
+  const std::vector<PhotoMistake> found = Found(corrupted);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].problem.kind, kind);
   bool restored = false;
   for (const PhotoMistake& claim : found) {
-    auto set = std::make_shared<session::ImageSet>(*spoilt.images);
+    auto set = std::make_shared<session::ImageSet>(*corrupted.images);
     ASSERT_TRUE(session::ApplyFix(claim.fix, set.get()).ok());
     EXPECT_LT(claim.left_after, 0.5 * claim.left_before);
     restored |=
@@ -96,7 +96,7 @@ TEST(PhotoMistakes, ReversedUpIsFound) {
   ImageSetFix reversed;
   reversed.reverse_up = true;
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
-  const std::vector<PhotoMistake> found = Found(Spoilt(input, reversed));
+  const std::vector<PhotoMistake> found = Found(Corrupted(input, reversed));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kUpAxis);
   EXPECT_TRUE(found[0].fix.reverse_up);
@@ -106,7 +106,7 @@ TEST(PhotoMistakes, TwoExchangedPicturesAreFound) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   ImageSetFix exchange;
   exchange.exchange = {2, 4};
-  const std::vector<PhotoMistake> found = Found(Spoilt(input, exchange));
+  const std::vector<PhotoMistake> found = Found(Corrupted(input, exchange));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kExchanged);
   EXPECT_EQ(found[0].fix.exchange, exchange.exchange);
@@ -134,7 +134,7 @@ TEST(PhotoMistakes, OnePictureWithReversedUpIsFound) {
   ImageSetFix one;
   one.images = {{3, 3}};
   one.reverse_up = true;
-  const std::vector<PhotoMistake> found = Found(Spoilt(input, one));
+  const std::vector<PhotoMistake> found = Found(Corrupted(input, one));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].problem.detail, "image 3");
   EXPECT_EQ(found[0].fix.images, one.images);
@@ -158,13 +158,13 @@ TEST(PhotoMistakes, ShiftedRowsAndExchangedNamesAreFound) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   ImageSetFix shift;
   shift.shift_rows = 1;
-  std::vector<PhotoMistake> found = Found(Spoilt(input, shift));
+  std::vector<PhotoMistake> found = Found(Corrupted(input, shift));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kRowShift);
   EXPECT_EQ(found[0].fix.shift_rows, -1);
   ImageSetFix names;
   names.rename_objects = {{"lat00", "lat20"}, {"lat20", "lat00"}};
-  found = Found(Spoilt(input, names));
+  found = Found(Corrupted(input, names));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kObjectNames);
   EXPECT_EQ(found[0].problem.detail, "lat00 <-> lat20");
@@ -174,9 +174,9 @@ TEST(PhotoMistakes, AnObjectOfAnotherMeshIsFound) {
   const DiagnosisInput input = images::MakePhotoInput(SmallCamera());
   ImageSetFix wrong;
   wrong.rename_objects = {{"lat20", "cup"}};
-  DiagnosisInput spoilt = Spoilt(input, wrong);
-  spoilt.surfaces["cup"] = images::PhotoTestSurface("lat05");
-  const std::vector<PhotoMistake> found = Found(spoilt);
+  DiagnosisInput corrupted = Corrupted(input, wrong);
+  corrupted.surfaces["cup"] = images::PhotoTestSurface("lat05");
+  const std::vector<PhotoMistake> found = Found(corrupted);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kWrongObject);
   EXPECT_EQ(found[0].problem.detail, "cup -> lat20");
@@ -225,7 +225,7 @@ TEST(PhotoMistakes, AMistakeIsFoundBesideMissingPhysics) {
   rig.hidden = {{"exposure", {"stops=0.4"}}, {"camera_rotation", {"rotation_deg=0.5,0,0.5"}}};
   ImageSetFix mistake;
   mistake.rotate_deg = 90;
-  const std::vector<PhotoMistake> found = Found(Spoilt(images::MakePhotoInput(rig), mistake));
+  const std::vector<PhotoMistake> found = Found(Corrupted(images::MakePhotoInput(rig), mistake));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kRotated);
   EXPECT_EQ(found[0].fix.rotate_deg, 270);
@@ -248,7 +248,7 @@ TEST(PhotoMistakes, ChannelsAreFoundOnlyWherePicturesDisagree) {
   ImageSetFix some;
   some.swap_channels = true;
   some.images = {{12, 17}};
-  const std::vector<PhotoMistake> found = Found(Spoilt(input, some));
+  const std::vector<PhotoMistake> found = Found(Corrupted(input, some));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].problem.kind, ProblemKind::kChannelOrder);
   EXPECT_EQ(session::FixOptions(found[0].fix), "--images 12-17 --swap-channels");

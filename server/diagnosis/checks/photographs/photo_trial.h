@@ -46,7 +46,7 @@ class PhotoTrial {
   std::vector<int> rows_;
 };
 
-// Mean of the best 70 % of the pictures: a few may be spoilt by something else.
+// Mean of the best 70 % of the pictures: a few may be corrupted by something else.
 double RobustLeft(std::vector<TrialPicture> pictures);
 
 // The model for pictures whose sides are `shrink` times shorter: values in pixels shrink with them.

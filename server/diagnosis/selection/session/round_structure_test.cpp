@@ -42,7 +42,7 @@ TEST(RoundStructure, SeesObjectsThatWerePutDownAnewAndHowFar) {
   EXPECT_NEAR(found.translation_m, 0.3e-3 * std::sqrt(0.75), 0.1e-3);  // about the mean of four rounds
 }
 
-// Few poses with most of the noise, whose contacts stand askew: the F test alone finds rounds in such sets.
+// Few poses with most of the noise, whose contacts stand rotated: the F test alone finds rounds in such sets.
 TEST(RoundStructure, IsNoNoiseThatIsLargerAtSomePoses) {
   for (uint64_t seed = 60; seed < 80; ++seed) {
     touches::SyntheticSet set = touches::TiltedSet(seed);

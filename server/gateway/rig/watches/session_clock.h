@@ -3,7 +3,7 @@
 //  - While a host runs, CLOCK_BOOTTIME counts, which also counts while it sleeps. The journal keeps where the session's
 //    time began on it, so that another process of the same boot (by its boot_id) goes on without a step.
 //  - After a reboot, or on another host, the time goes on from the last touch that is done or the last photograph, by
-//    what the wall clock has gone since then. That is believed from the time since the boot (so much has certainly
+//    what the wall clock has gone since then. That is accepted from the time since the boot (so much has certainly
 //    passed) up to 31 days; where the wall clock says anything else, only the time since the boot is added.
 // The journal's start_unix_s is the wall clock's, as it was.
 #pragma once

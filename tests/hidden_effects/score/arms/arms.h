@@ -23,7 +23,7 @@ enum class Kind {
   kBadPrint,           // surface bumps that show
   kOldValue,           // a value of the model's own, which a new effect could stand in for
   kWrongNoise,         // noise in the model that the data do not have
-  kBlunder,            // a mistake in the file
+  kDataError,          // a mistake in the file
   kTooFew,             // fewer touches than a verdict needs
 };
 

@@ -9,7 +9,7 @@
 namespace touchstone::hidden {
 namespace {
 
-constexpr int kSets = 20, kBlunderSets = 10;
+constexpr int kSets = 20, kDataErrorSets = 10;
 
 using Draw = std::function<Scenario(const TestObjects&, uint64_t seed, Strength strength)>;
 
@@ -38,7 +38,7 @@ Draw WithCause(CauseKind kind) {
 }
 
 // 160 touches (weak), the whole set with a realistic effect of the catalogue beside (realistic), the whole set alone.
-Draw WithBlunderOf(BlunderKind kind) {
+Draw WithDataErrorOf(DataErrorKind kind) {
   return [kind](const TestObjects& objects, uint64_t seed, Strength strength) {
     Scenario scenario = WholeSet(objects);
     if (strength == Strength::kWeak) scenario.poses = 8;
@@ -47,7 +47,7 @@ Draw WithBlunderOf(BlunderKind kind) {
       const auto& effects = EffectsOfExpectation();
       scenario.hidden = {RealisticEffect(effects[random() % effects.size()], scenario, seed)};
     }
-    scenario.blunders = {DrawnBlunder(kind, scenario, seed, strength)};
+    scenario.data_errors = {DrawnDataError(kind, scenario, seed, strength)};
     return scenario;
   };
 }
@@ -135,23 +135,23 @@ std::vector<Outside> Causes() {
 }
 
 std::vector<Outside> Mistakes() {
-  const auto blunder = [](const char* name, BlunderKind kind) {
-    return Outside{name, Kind::kBlunder, WithBlunderOf(kind)};
+  const auto data_error = [](const char* name, DataErrorKind kind) {
+    return Outside{name, Kind::kDataError, WithDataErrorOf(kind)};
   };
   return {
-      blunder("lateral reversed", BlunderKind::kLateralReversed),
-      blunder("approach reversed", BlunderKind::kApproachReversed),
-      blunder("fingers permuted", BlunderKind::kFingersPermuted),
-      blunder("column sorted", BlunderKind::kColumnSorted),
-      blunder("objects swapped", BlunderKind::kObjectsSwapped),
-      blunder("wrong object", BlunderKind::kWrongObject),
-      blunder("time units", BlunderKind::kTimeUnits),
-      blunder("length units", BlunderKind::kLengthUnits),
-      blunder("speed factor", BlunderKind::kSpeedFactor),
-      blunder("object lower", BlunderKind::kObjectLower),
-      blunder("frame turned", BlunderKind::kFrameTurned),
-      blunder("rows shifted", BlunderKind::kRowsShifted),
-      blunder("copies", BlunderKind::kCopies),
+      data_error("lateral reversed", DataErrorKind::kLateralReversed),
+      data_error("approach reversed", DataErrorKind::kApproachReversed),
+      data_error("fingers permuted", DataErrorKind::kFingersPermuted),
+      data_error("column sorted", DataErrorKind::kColumnSorted),
+      data_error("objects swapped", DataErrorKind::kObjectsSwapped),
+      data_error("wrong object", DataErrorKind::kWrongObject),
+      data_error("time units", DataErrorKind::kTimeUnits),
+      data_error("length units", DataErrorKind::kLengthUnits),
+      data_error("speed factor", DataErrorKind::kSpeedFactor),
+      data_error("object lower", DataErrorKind::kObjectLower),
+      data_error("frame turned", DataErrorKind::kFrameTurned),
+      data_error("rows shifted", DataErrorKind::kRowsShifted),
+      data_error("copies", DataErrorKind::kCopies),
       {"1 touch", Kind::kTooFew, Few(1)},
       {"6 touches", Kind::kTooFew, Few(6)},
   };
@@ -170,7 +170,7 @@ std::vector<Arm> OutsideArms() {
       Arm arm;
       arm.name = std::string(outside.name) + ", " + word;
       arm.kind = outside.kind;
-      arm.sets = outside.kind == Kind::kBlunder ? kBlunderSets : kSets;
+      arm.sets = outside.kind == Kind::kDataError ? kDataErrorSets : kSets;
       arm.draw = [draw = outside.draw, strength = strength](const TestObjects& objects, uint64_t seed) {
         return draw(objects, seed, strength);
       };

@@ -148,54 +148,54 @@ Hidden BeyondBound(const Scenario& scenario, uint64_t seed, Strength strength) {
   return {effect, values};
 }
 
-Blunder DrawnBlunder(BlunderKind kind, const Scenario& scenario, uint64_t seed, Strength strength) {
+DataError DrawnDataError(DataErrorKind kind, const Scenario& scenario, uint64_t seed, Strength strength) {
   auto random = Stream(seed, "blunder");
-  Blunder blunder{kind, 0, {}};
+  DataError data_error{kind, 0, {}};
   switch (kind) {
-    case BlunderKind::kLateralReversed:
-    case BlunderKind::kApproachReversed:
+    case DataErrorKind::kLateralReversed:
+    case DataErrorKind::kApproachReversed:
       break;
-    case BlunderKind::kColumnSorted:
-      blunder.which = {static_cast<int>(random() % scenario.fingers)};
+    case DataErrorKind::kColumnSorted:
+      data_error.which = {static_cast<int>(random() % scenario.fingers)};
       break;
-    case BlunderKind::kFingersPermuted: {
+    case DataErrorKind::kFingersPermuted: {
       std::vector<int> order(scenario.fingers);
       for (int i = 0; i < scenario.fingers; ++i) order[i] = i;
       while (std::is_sorted(order.begin(), order.end())) std::shuffle(order.begin(), order.end(), random);
-      blunder.which = order;
+      data_error.which = order;
       break;
     }
-    case BlunderKind::kObjectsSwapped:
-    case BlunderKind::kWrongObject: {
+    case DataErrorKind::kObjectsSwapped:
+    case DataErrorKind::kWrongObject: {
       const int objects = scenario.objects.size(), one = random() % objects;
-      blunder.which = {one, static_cast<int>((one + 1 + random() % (objects - 1)) % objects)};
+      data_error.which = {one, static_cast<int>((one + 1 + random() % (objects - 1)) % objects)};
       break;
     }
-    case BlunderKind::kTimeUnits:
-      blunder.number = OneOf<double>({0.1, 10, 0.001, 1000}, random);
+    case DataErrorKind::kTimeUnits:
+      data_error.number = OneOf<double>({0.1, 10, 0.001, 1000}, random);
       break;
-    case BlunderKind::kLengthUnits:
-      blunder.number = OneOf<double>({0.1, 0.001, 1 / 25.4}, random);
+    case DataErrorKind::kLengthUnits:
+      data_error.number = OneOf<double>({0.1, 0.001, 1 / 25.4}, random);
       break;
-    case BlunderKind::kSpeedFactor:
-      blunder.number = OneOf<double>({2, 2, 0.5, 10, 60}, random);
+    case DataErrorKind::kSpeedFactor:
+      data_error.number = OneOf<double>({2, 2, 0.5, 10, 60}, random);
       break;
-    case BlunderKind::kObjectLower:
-      blunder.number = Uniform(15, 30, random);
+    case DataErrorKind::kObjectLower:
+      data_error.number = Uniform(15, 30, random);
       break;
-    case BlunderKind::kFrameTurned:
+    case DataErrorKind::kFrameTurned:
       // The objects look alike from four sides about z.
-      blunder.number = OneOf<double>({90, 270}, random);
+      data_error.number = OneOf<double>({90, 270}, random);
       break;
-    case BlunderKind::kRowsShifted:
-      blunder.which = {OneOf<int>({-1, 1}, random)};
+    case DataErrorKind::kRowsShifted:
+      data_error.which = {OneOf<int>({-1, 1}, random)};
       break;
-    case BlunderKind::kCopies:
-      blunder.number = strength == Strength::kWeak ? 0.1 : strength == Strength::kRealistic ? 0.5 : 1;
-      blunder.which = {strength == Strength::kStrong ? 3 : 1};
+    case DataErrorKind::kCopies:
+      data_error.number = strength == Strength::kWeak ? 0.1 : strength == Strength::kRealistic ? 0.5 : 1;
+      data_error.which = {strength == Strength::kStrong ? 3 : 1};
       break;
   }
-  return blunder;
+  return data_error;
 }
 
 }  // namespace touchstone::hidden

@@ -22,6 +22,6 @@ double SignalOf(const Cause& cause, const Scenario& scenario, uint64_t seed);
 Hidden BeyondBound(const Scenario& scenario, uint64_t seed, Strength strength);
 
 // A mistake of this kind, with a number that people make it with.
-Blunder DrawnBlunder(BlunderKind kind, const Scenario& scenario, uint64_t seed, Strength strength);
+DataError DrawnDataError(DataErrorKind kind, const Scenario& scenario, uint64_t seed, Strength strength);
 
 }  // namespace touchstone::hidden

@@ -36,7 +36,7 @@ inline DiagnosisInput MakeFile(const touches::HiddenRig& rig) {
 // A rig with physics that the model lacks: it must neither hide a mistake nor be one.
 inline touches::HiddenRig Rig(uint64_t seed = 1) {
   touches::HiddenRig rig;
-  // The shapes look the same from several sides; an object that stands askew, as the model knows, does not.
+  // The shapes look the same from several sides; an object that stands rotated, as the model knows, does not.
   rig.known = {{"object_pose", {"translation_mm=4,-3,2", "rotation_deg=20,-15,25"}}};
   rig.hidden = rig.known;
   rig.hidden.push_back({"tip_radius", {"radius_mm=0.5"}});
@@ -47,15 +47,15 @@ inline touches::HiddenRig Rig(uint64_t seed = 1) {
   return rig;
 }
 
-inline DiagnosisInput Spoilt(DiagnosisInput input, const std::function<void(MeasurementSet*)>& spoil) {
+inline DiagnosisInput Corrupted(DiagnosisInput input, const std::function<void(MeasurementSet*)>& corrupt) {
   auto set = std::make_shared<MeasurementSet>(*input.set);
-  spoil(set.get());
+  corrupt(set.get());
   input.set = set;
   return input;
 }
 
-inline DiagnosisInput Spoilt(const DiagnosisInput& input, const MeasurementFix& fix) {
-  return Spoilt(input, [&](MeasurementSet* set) { ASSERT_TRUE(session::ApplyFix(fix, set).ok()); });
+inline DiagnosisInput Corrupted(const DiagnosisInput& input, const MeasurementFix& fix) {
+  return Corrupted(input, [&](MeasurementSet* set) { ASSERT_TRUE(session::ApplyFix(fix, set).ok()); });
 }
 
 inline std::vector<engine::DataProblem> ProblemsOf(const DiagnosisInput& input) {

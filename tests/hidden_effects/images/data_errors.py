@@ -85,5 +85,5 @@ def make(name, files, random):
         files.truth.notes["image"] = number
     else:
         raise ValueError(name)
-    files.truth.blunder = name
+    files.truth.data_error = name
     return files

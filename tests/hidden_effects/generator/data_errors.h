@@ -6,7 +6,7 @@
 
 namespace touchstone::hidden {
 
-enum class BlunderKind {
+enum class DataErrorKind {
   kLateralReversed,
   kApproachReversed,
   kFingersPermuted,  // which: the column that each finger's times are taken from
@@ -22,20 +22,20 @@ enum class BlunderKind {
   kCopies,           // number: share of the rows; which: how often each of them is there once more
 };
 
-struct Blunder {
-  BlunderKind kind = BlunderKind::kLateralReversed;
+struct DataError {
+  DataErrorKind kind = DataErrorKind::kLateralReversed;
   double number = 0;
   std::vector<int> which;
 };
 
 // The file with the mistake.
-std::string WithBlunder(const std::string& csv, const Blunder& blunder);
+std::string WithDataError(const std::string& csv, const DataError& data_error);
 
 // Kinds of v1::DataProblem that say the same: a mistake may have several names, for instance times in tenths and
 // speeds ten times as large.
-std::vector<std::string> ProblemKinds(const Blunder& blunder);
+std::vector<std::string> ProblemKinds(const DataError& data_error);
 
 // "speed factor 2".
-std::string InWords(const Blunder& blunder);
+std::string InWords(const DataError& data_error);
 
 }  // namespace touchstone::hidden

@@ -1,4 +1,4 @@
-#include "tests/hidden_effects/generator/blunders.h"
+#include "tests/hidden_effects/generator/data_errors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -139,85 +139,86 @@ void AddCopies(CsvTable* table, double share, int times) {
 
 }  // namespace
 
-std::string WithBlunder(const std::string& csv, const Blunder& blunder) {
+std::string WithDataError(const std::string& csv, const DataError& data_error) {
   CsvTable table(csv);
-  switch (blunder.kind) {
-    case BlunderKind::kLateralReversed:
+  switch (data_error.kind) {
+    case DataErrorKind::kLateralReversed:
       table.Scale(table.Vector("lateral"), -1);
       break;
-    case BlunderKind::kApproachReversed:
+    case DataErrorKind::kApproachReversed:
       table.Scale(table.Vector("approach"), -1);
       break;
-    case BlunderKind::kFingersPermuted:
-      PermuteTimes(&table, blunder.which);
+    case DataErrorKind::kFingersPermuted:
+      PermuteTimes(&table, data_error.which);
       break;
-    case BlunderKind::kColumnSorted:
-      SortTimes(&table, blunder.which.at(0));
+    case DataErrorKind::kColumnSorted:
+      SortTimes(&table, data_error.which.at(0));
       break;
-    case BlunderKind::kObjectsSwapped:
-    case BlunderKind::kWrongObject:
-      Rename(&table, blunder.which.at(0), blunder.which.at(1), blunder.kind == BlunderKind::kObjectsSwapped);
+    case DataErrorKind::kObjectsSwapped:
+    case DataErrorKind::kWrongObject:
+      Rename(&table, data_error.which.at(0), data_error.which.at(1),
+             data_error.kind == DataErrorKind::kObjectsSwapped);
       break;
-    case BlunderKind::kTimeUnits:
-      table.Scale(table.Times(), blunder.number);
+    case DataErrorKind::kTimeUnits:
+      table.Scale(table.Times(), data_error.number);
       break;
-    case BlunderKind::kLengthUnits:
-      table.Scale(table.Vector("target", "_mm"), blunder.number);
-      table.Scale({table.Column("standoff_mm")}, blunder.number);
+    case DataErrorKind::kLengthUnits:
+      table.Scale(table.Vector("target", "_mm"), data_error.number);
+      table.Scale({table.Column("standoff_mm")}, data_error.number);
       break;
-    case BlunderKind::kSpeedFactor:
-      table.Scale({table.Column("speed_mm_s")}, blunder.number);
+    case DataErrorKind::kSpeedFactor:
+      table.Scale({table.Column("speed_mm_s")}, data_error.number);
       break;
-    case BlunderKind::kObjectLower: {
+    case DataErrorKind::kObjectLower: {
       const size_t z = table.Column("target_z_mm");
-      for (Row& row : table.rows) row[z] = Text(std::atof(row[z].c_str()) + blunder.number);
+      for (Row& row : table.rows) row[z] = Text(std::atof(row[z].c_str()) + data_error.number);
       break;
     }
-    case BlunderKind::kFrameTurned:
-      TurnFrame(&table, blunder.number);
+    case DataErrorKind::kFrameTurned:
+      TurnFrame(&table, data_error.number);
       break;
-    case BlunderKind::kRowsShifted:
-      ShiftTimes(&table, blunder.which.at(0));
+    case DataErrorKind::kRowsShifted:
+      ShiftTimes(&table, data_error.which.at(0));
       break;
-    case BlunderKind::kCopies:
-      AddCopies(&table, blunder.number, blunder.which.at(0));
+    case DataErrorKind::kCopies:
+      AddCopies(&table, data_error.number, data_error.which.at(0));
       break;
   }
   return table.Csv();
 }
 
-std::vector<std::string> ProblemKinds(const Blunder& blunder) {
-  switch (blunder.kind) {
-    case BlunderKind::kLateralReversed:
+std::vector<std::string> ProblemKinds(const DataError& data_error) {
+  switch (data_error.kind) {
+    case DataErrorKind::kLateralReversed:
       return {"lateral_reversed", "finger_order"};
-    case BlunderKind::kFingersPermuted:
-      if (std::is_sorted(blunder.which.rbegin(), blunder.which.rend()))
+    case DataErrorKind::kFingersPermuted:
+      if (std::is_sorted(data_error.which.rbegin(), data_error.which.rend()))
         return {"finger_order", "lateral_reversed"};
       return {"finger_order"};
-    case BlunderKind::kApproachReversed:
+    case DataErrorKind::kApproachReversed:
       return {"approach_reversed"};
-    case BlunderKind::kObjectsSwapped:
-    case BlunderKind::kWrongObject:
+    case DataErrorKind::kObjectsSwapped:
+    case DataErrorKind::kWrongObject:
       return {"object_names", "wrong_mesh"};
-    case BlunderKind::kTimeUnits:
-    case BlunderKind::kSpeedFactor:
+    case DataErrorKind::kTimeUnits:
+    case DataErrorKind::kSpeedFactor:
       return {"units_time", "speed_factor"};
-    case BlunderKind::kLengthUnits:
+    case DataErrorKind::kLengthUnits:
       return {"units_length"};
-    case BlunderKind::kObjectLower:
+    case DataErrorKind::kObjectLower:
       return {"object_origin"};
-    case BlunderKind::kFrameTurned:
+    case DataErrorKind::kFrameTurned:
       return {"frame"};
-    case BlunderKind::kColumnSorted:
-    case BlunderKind::kRowsShifted:
+    case DataErrorKind::kColumnSorted:
+    case DataErrorKind::kRowsShifted:
       return {"row_shift"};
-    case BlunderKind::kCopies:
+    case DataErrorKind::kCopies:
       return {"duplicates"};
   }
   return {};
 }
 
-std::string InWords(const Blunder& blunder) {
+std::string InWords(const DataError& data_error) {
   static const char* const kNames[] = {"lateral reversed",
                                        "approach reversed",
                                        "fingers permuted",
@@ -231,9 +232,9 @@ std::string InWords(const Blunder& blunder) {
                                        "frame turned",
                                        "rows shifted",
                                        "copies"};
-  std::string words = kNames[static_cast<int>(blunder.kind)];
-  if (blunder.number != 0) words += " " + Text(blunder.number);
-  for (const int which : blunder.which) words += " " + std::to_string(which);
+  std::string words = kNames[static_cast<int>(data_error.kind)];
+  if (data_error.number != 0) words += " " + Text(data_error.number);
+  for (const int which : data_error.which) words += " " + std::to_string(which);
   return words;
 }
 
