@@ -11,6 +11,7 @@
 #include "server/diagnosis/selection/session/pose_columns.h"
 #include "server/diagnosis/selection/session/turns.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
+#include "server/diagnosis/touches/noise/rules.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::selection {
@@ -162,7 +163,7 @@ class Tester {
     const touches::TouchTicks ticks = touches::FindTouchTicks(o_);
     const touches::FingerTicks own = touches::FindFingerTicks(o_);
     const auto by_chance = [](double interval_s, int times) {
-      return interval_s > 0 ? std::pow(2 * touches::kTickToleranceS / interval_s, times) : 1;
+      return interval_s > 0 ? std::pow(2 * touches::kNoiseRules.tick_tolerance / interval_s, times) : 1;
     };
     return std::min(by_chance(ticks.interval_s, ticks.touches), by_chance(own.interval_s, own.times));
   }

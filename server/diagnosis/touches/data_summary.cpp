@@ -4,15 +4,9 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/diagnosis/touches/rules.h"
 
 namespace touchstone::diagnosis::touches {
-namespace {
-
-constexpr size_t kMaxSpeeds = 20;
-constexpr size_t kMaxExamples = 5;
-
-}  // namespace
-
 DataSummary SummarizeData(const Observations& o) {
   const session::MeasurementSet& set = *o.set;
   DataSummary data;
@@ -22,7 +16,7 @@ DataSummary SummarizeData(const Observations& o) {
   for (const auto& [reason, touches] : o.unused) {
     UnusedTouches& unused = data.unused[reason];
     unused.count = static_cast<int>(touches.size());
-    for (size_t i = 0; i < touches.size() && i < kMaxExamples; ++i)
+    for (size_t i = 0; i < touches.size() && i < kTouchRules.max_examples; ++i)
       unused.examples.push_back(set.touch[o.row[touches[i]]]);
   }
   data.outliers = static_cast<int>(LeftOutFor(o, kOutlierReason).size());
@@ -37,7 +31,7 @@ DataSummary SummarizeData(const Observations& o) {
     poses.insert(o.pose[k]);
     if (!set.round.empty()) rounds.insert(set.round[o.row[k]]);
     // To a micrometre per second: what files write.
-    if (speeds_mm_s.size() < kMaxSpeeds)
+    if (speeds_mm_s.size() < kTouchRules.max_speeds)
       speeds_mm_s.insert(std::round(set.speed_m_s[o.row[k]] * 1e6) / kMillimetresPerMetre);
   }
   data.poses = static_cast<int>(poses.size());

@@ -10,12 +10,10 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/diagnosis/touches/rules.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
-
-// More backward steps of the session time than this share: the file is not in the order of the session.
-constexpr double kMaxBackward = 0.05;
 
 absl::Status CheckInput(const DiagnosisInput& input) {
   const session::MeasurementSet& set = *input.set;
@@ -43,7 +41,7 @@ std::vector<int> SessionOrder(const session::MeasurementSet& set) {
   if (!set.has_session_time) return rows;
   int backward = 0;
   for (int k = 1; k < set.size(); ++k) backward += set.session_time_s[k] < set.session_time_s[k - 1];
-  if (backward > kMaxBackward * set.size())
+  if (backward > kTouchRules.max_backward * set.size())
     std::stable_sort(rows.begin(), rows.end(),
                      [&](int a, int b) { return set.session_time_s[a] < set.session_time_s[b]; });
   return rows;
@@ -70,14 +68,13 @@ void FindPoses(Observations* o) {
 // The largest distance along the approach between two fingers that touch the object, m: its box, and what it may lie or be
 // larger.
 double ThicknessAlong(const Observations& o, int k) {
-  constexpr double kLarger = 1.5, kApartM = 0.02;
   const geometry::Bounds& bounds = o.surfaces[o.object[k]]->bounds();
-  return kLarger * o.set->approach[o.row[k]].cwiseAbs().dot(bounds.max_m - bounds.min_m) + kApartM;
+  return kTouchRules.larger_object * o.set->approach[o.row[k]].cwiseAbs().dot(bounds.max_m - bounds.min_m) +
+         kTouchRules.object_apart;
 }
 
 // A few touches whose fingers cannot have met this object, whatever the model; many are no slips of single readings, and stay.
 void LeaveOutImpossible(Observations* o) {
-  constexpr double kFewShare = 0.01;
   std::vector<int> impossible;
   for (int k = 0; k < o->size(); ++k) {
     if (!o->used[k]) continue;
@@ -88,7 +85,7 @@ void LeaveOutImpossible(Observations* o) {
     }
     if ((last_s - first_s) * o->set->speed_m_s[o->row[k]] > ThicknessAlong(*o, k)) impossible.push_back(k);
   }
-  if (static_cast<double>(impossible.size()) > std::max(1.0, kFewShare * o->size())) return;
+  if (static_cast<double>(impossible.size()) > std::max(1.0, kTouchRules.few_impossible * o->size())) return;
   for (const int k : impossible) LeaveOut(o, k, kImpossibleReason);
 }
 

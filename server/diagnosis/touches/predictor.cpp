@@ -6,13 +6,12 @@
 #include <optional>
 
 #include "server/base/status.h"
+#include "server/diagnosis/touches/rules.h"
 #include "server/effects/contact/surface_departure.h"
 #include "server/touch/batch_row.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
-
-constexpr int kBlock = 1024;
 
 // Whether touches of one pose may differ under this model.
 bool DependsOnSession(const model::Model& model) {
@@ -42,7 +41,7 @@ std::vector<Predictor::Block> Predictor::MakeBlocks(const Observations& observat
   std::vector<int> open(observations.objects.size(), -1);  // the block of each object that has room
   for (const int k : touches) {
     const int object = observations.object[k];
-    if (open[object] < 0 || blocks[open[object]].touches.size() == kBlock) {
+    if (open[object] < 0 || static_cast<int>(blocks[open[object]].touches.size()) == kTouchRules.block) {
       open[object] = static_cast<int>(blocks.size());
       blocks.push_back({object, {}});
     }

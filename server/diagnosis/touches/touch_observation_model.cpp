@@ -4,16 +4,9 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/touches/rules.h"
 
 namespace touchstone::diagnosis::touches {
-namespace {
-
-constexpr double kJumpM = 0.3e-3;  // a finger that moves so far within a step has met another face
-constexpr double kJumpOverMedian = 200;
-constexpr double kMinCosine = 0.1;
-
-}  // namespace
-
 double TouchObservationModel::TimeOfRow(int row) const {
   const int in_set = observations_.row[TouchOfRow(row)];
   const session::MeasurementSet& set = *observations_.set;
@@ -47,7 +40,8 @@ Eigen::VectorXd TouchObservationModel::Change(const std::vector<double>& predict
   std::nth_element(sizes_s.begin(), sizes_s.begin() + sizes_s.size() / 2, sizes_s.end());
   const double median_s = sizes_s[sizes_s.size() / 2];
   for (int k = 0; k < o.size(); ++k) {
-    const double jump_s = std::max(kJumpM / o.set->speed_m_s[o.row[k]], kJumpOverMedian * median_s);
+    const double jump_s =
+        std::max(kTouchRules.jump / o.set->speed_m_s[o.row[k]], kTouchRules.jump_over_median * median_s);
     for (int i = 0; i < o.fingers; ++i) {
       double& value_s = change_s[static_cast<size_t>(k) * o.fingers + i];
       if (std::abs(value_s) > jump_s) value_s = 0;
@@ -82,8 +76,8 @@ engine::SmoothErrorGeometry SurfaceErrorGeometry(const Observations& o, const Co
       engine::SmoothErrorSite site;
       site.position_m = details.contact_m[entry];
       site.first_row = contrasts.FirstRow(touch);
-      const double time_per_m =
-          -details.inverse_speed_s_per_m[entry] / std::max(details.cos_incidence[entry], kMinCosine);
+      const double time_per_m = -details.inverse_speed_s_per_m[entry] /
+                                std::max(details.cos_incidence[entry], kTouchRules.min_cosine.value());
       for (int j = 0; j < h.rows(); ++j)
         site.row_per_m.push_back(contrasts.root_weights()[t] * time_per_m * h(j, i));
       geometry.sites[o.object[k]].push_back(std::move(site));

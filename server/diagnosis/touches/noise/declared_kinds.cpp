@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/diagnosis/touches/noise/noise_search.h"
+#include "server/diagnosis/touches/noise/rules.h"
 
 namespace touchstone::diagnosis::touches {
 
@@ -33,10 +34,10 @@ void NoiseSearch::JudgeDeclaredTails() {
   const double without = ProfileSigma(part_, &gaussian);
   told.shape = NoiseShape::kStudent;
   told.degrees_of_freedom = *declared_.degrees_of_freedom;
-  if (without - ProfileSigma(part_, &told) < kExcludedNats) return;
+  if (without - ProfileSigma(part_, &told) < kNoiseRules.declared_excluded) return;
   Description student = FitStudent(best_);
   student.tails.gain_nats = student.log_likelihood - without;
-  if (student.tails.gain_nats >= kAlreadyNats)
+  if (student.tails.gain_nats >= kNoiseRules.declared_gain)
     best_ = std::move(student);
   else
     found_->degrees_of_freedom.absent = true;
@@ -48,7 +49,8 @@ void NoiseSearch::JudgeDeclaredScales() {
   for (const Kind kind : {kGrowth, kLength, kChannels}) {
     if (!Declared(kind) || best_.has[kind] || !Possible(kind)) continue;
     NoiseModel without = best_.model, told = AsDeclared(kind);
-    if (ProfileSigma(groups, &without) - ProfileSigma(groups, &told) < kExcludedNats) continue;
+    if (ProfileSigma(groups, &without) - ProfileSigma(groups, &told) < kNoiseRules.declared_excluded)
+      continue;
     (kind == kGrowth   ? found_->slope.absent
      : kind == kLength ? found_->length_sigma_m.absent
                        : found_->channels_absent) = true;

@@ -5,22 +5,18 @@
 #include <map>
 
 #include "server/diagnosis/touches/noise/noise_search.h"
+#include "server/diagnosis/touches/noise/rules.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
 
-constexpr double kExcludedNats = 5;  // loss that rules a declared value out
-constexpr size_t kMinDelays = 20;
-constexpr double kHiddenShare = 0.25;  // of the variance that is the ticks': the rest's shape does not show
-constexpr double kMinMissed = 0.002;   // share of the readings: less is no property of the rig
-
 NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<double>& declared_s) {
   NoiseEstimate found;
-  if (differences.size() < kMinDelays) return found;
+  if (differences.size() < kNoiseRules.min_delays) return found;
   std::sort(differences.begin(), differences.end());
   double interval = FindTick(differences);
-  if (interval == 0 && declared_s && *declared_s >= kMinTickS) {
+  if (interval == 0 && declared_s && *declared_s >= kNoiseRules.min_tick) {
     interval = RefinedTick(differences, *declared_s);
     found.absent = interval == 0;
   }
@@ -30,7 +26,7 @@ NoiseEstimate FindPolling(std::vector<double> differences, const std::optional<d
       0.5e-6 / std::sqrt(static_cast<double>(differences.size())) * interval / differences.back();
   found.std_error = std::max(found.std_error, 1e-9);
   // Each difference would fall on a tick by chance with this probability.
-  found.gain_nats = differences.size() * std::log(interval / (2 * kTickToleranceS));
+  found.gain_nats = differences.size() * std::log(interval / (2 * kNoiseRules.tick_tolerance));
   return found;
 }
 
@@ -82,9 +78,10 @@ NoiseEstimate FindMissed(const std::vector<RepeatedReading>& repeated,
   NoiseEstimate found;
   if (all == 0) return found;
   found.value = chance || among_repeats == 0 ? silent / all : among_repeats;
-  const bool rare = silent < 3 || silent < kMinMissed * all;
+  const bool rare = silent < 3 || silent < kNoiseRules.min_missed * all;
   if (rare && declared && *declared > 0 && *declared < 1)
-    found.absent = SilenceLog(silent, all, found.value) - SilenceLog(silent, all, *declared) >= kExcludedNats;
+    found.absent = SilenceLog(silent, all, found.value) - SilenceLog(silent, all, *declared) >=
+                   kNoiseRules.declared_excluded;
   if (rare) return found;
   found.std_error = std::sqrt(found.value * (1 - found.value) / all);
   found.gain_nats = silent * std::log(1 / 1e-4);
@@ -137,7 +134,8 @@ NoiseFindings FindNoise(const NoiseSample& sample, double effective_dof, const D
   // Polling adds the scatter of the ticks.
   if (found.poll_interval_s.gain_nats > 0) {
     const double tick = found.poll_interval_s.value;
-    found.shape_hidden = tick * tick / 12 > kHiddenShare * found.sigma_s.value * found.sigma_s.value;
+    found.shape_hidden =
+        tick * tick / 12 > kNoiseRules.hidden_share * found.sigma_s.value * found.sigma_s.value;
     if (found.shape_hidden) {
       for (NoiseEstimate* kind : {&found.slope, &found.degrees_of_freedom, &found.length_sigma_m})
         kind->absent = false;

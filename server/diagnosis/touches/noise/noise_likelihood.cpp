@@ -6,12 +6,12 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/touches/noise/golden_section.h"
+#include "server/diagnosis/touches/noise/rules.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
 
-constexpr int kNodes = 20;     // per reading, of the integral over the common shift
-constexpr int kSearches = 13;  // golden section steps
+constexpr int kNodes = 20;  // per reading, of the integral over the common shift
 const double kLogTwoPi = std::log(2 * kPi);
 
 double LogGaussian(const ReadingGroup& group, const NoiseModel& model) {
@@ -99,10 +99,9 @@ double RelativeScale(const ReadingGroup& group, size_t i, const NoiseModel& mode
 }
 
 bool SpeedsDiffer(const std::vector<ReadingGroup>& groups) {
-  constexpr double kMinSlownessSpread = 1.2;  // largest over smallest
   const auto [low, high] = std::minmax_element(
       groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.slowness < b.slowness; });
-  return high->slowness > kMinSlownessSpread * low->slowness;
+  return high->slowness > kNoiseRules.min_slowness_spread * low->slowness;
 }
 
 double NoiseLogLikelihood(const std::vector<ReadingGroup>& groups, const NoiseModel& model) {
@@ -143,7 +142,7 @@ double ProfileSigma(const std::vector<ReadingGroup>& groups, NoiseModel* model) 
   };
   const double from = std::log(model->sigma_s);
   double max = 0;
-  model->sigma_s = std::exp(Maximise(value, from - 1.5, from + 0.5, kSearches, &max));
+  model->sigma_s = std::exp(Maximise(value, from - 1.5, from + 0.5, kNoiseRules.sigma_steps, &max));
   return max;
 }
 

@@ -4,11 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "server/diagnosis/touches/noise/rules.h"
+
 namespace touchstone::diagnosis::touches {
 namespace {
-
-constexpr double kMaxTangent = 10;
-constexpr size_t kMaxDelays = 6000;
 
 std::vector<ReadingGroup> GroupsOf(const Observations& o, const std::vector<double>& residuals_s,
                                    const std::vector<double>& tan_incidence) {
@@ -21,7 +20,7 @@ std::vector<ReadingGroup> GroupsOf(const Observations& o, const std::vector<doub
       const size_t e = static_cast<size_t>(k) * o.fingers + i;
       if (std::isnan(residuals_s[e]) || std::isnan(tan_incidence[e])) continue;
       group.residual_s.push_back(residuals_s[e]);
-      group.growth.push_back(std::min(tan_incidence[e], kMaxTangent));
+      group.growth.push_back(std::min(tan_incidence[e], kNoiseRules.max_tangent.value()));
       group.channel.push_back(i);
     }
     if (group.residual_s.size() >= 2) groups.push_back(std::move(group));
@@ -69,7 +68,7 @@ std::vector<ReadingGroup> RepeatsOf(const Observations& o, const std::vector<Rea
 // Times after the touch's first finger.
 std::vector<double> DelaysOf(const Observations& o) {
   std::vector<double> delays_s;
-  for (int k = 0; k < o.size() && delays_s.size() < kMaxDelays; ++k) {
+  for (int k = 0; k < o.size() && delays_s.size() < kNoiseRules.max_delays; ++k) {
     if (!o.used[k]) continue;
     double first_s = INFINITY;
     for (int i = 0; i < o.fingers; ++i) {

@@ -6,21 +6,10 @@
 #include <utility>
 
 #include "server/diagnosis/touches/noise/golden_section.h"
+#include "server/diagnosis/touches/noise/rules.h"
 
 namespace touchstone::diagnosis::touches {
 namespace {
-
-constexpr size_t kMaxPart = 1500;      // groups that the shape of tails is judged on
-constexpr double kEnterNats = 10;      // gain in log likelihood that a further noise parameter needs
-constexpr double kSimplerNats = 1;     // that a noise of times beside one of lengths must bring
-constexpr double kKurtosisSigmas = 4;  // of the sample's excess kurtosis before tails are looked at
-constexpr double kMinSlope = 0.02, kMaxSlope = 10;
-constexpr double kMaxScale = 8;         // of one channel's noise over another's
-constexpr size_t kMinRepeats = 60;      // groups, for repeats to be asked
-constexpr double kRepeatsShare = 0.25;  // of the gain that repeats must show
-constexpr double kRepeatsNats = 3;
-constexpr double kWithoutRepeatsNats = 20;  // gain that a kind needs which no repeat can confirm
-constexpr double kRepeatsKurtosisSigmas = 2;
 
 // Standard error from the curvature of a log likelihood at its maximum.
 double CurvatureError(const std::function<double(double)>& f, double at, double step) {
@@ -29,9 +18,10 @@ double CurvatureError(const std::function<double(double)>& f, double at, double 
 }
 
 std::vector<ReadingGroup> Thinned(const std::vector<ReadingGroup>& all) {
-  if (all.size() <= kMaxPart) return all;
+  if (all.size() <= kNoiseRules.max_part) return all;
   std::vector<ReadingGroup> part;
-  for (size_t j = 0; j < kMaxPart; ++j) part.push_back(all[all.size() * j / kMaxPart]);
+  for (size_t j = 0; j < kNoiseRules.max_part; ++j)
+    part.push_back(all[all.size() * j / kNoiseRules.max_part]);
   return part;
 }
 
@@ -71,7 +61,6 @@ double MedianSigma(const std::vector<ReadingGroup>& groups, const NoiseModel& mo
 
 // Groups with a reading that is more likely an outlier than not.
 void FindOutliers(const std::vector<ReadingGroup>& groups, const NoiseModel& model, NoiseFindings* found) {
-  constexpr double kBeside = 0.6;
   std::vector<double> off;  // in scales
   for (const ReadingGroup& group : groups) {
     if (OutlierProbability(group, model) <= 0.5) continue;
@@ -83,7 +72,8 @@ void FindOutliers(const std::vector<ReadingGroup>& groups, const NoiseModel& mod
   if (off.empty()) return;
   const double farthest = *std::max_element(off.begin(), off.end());
   for (size_t j = 0; j < off.size(); ++j)
-    if (off[j] > kBeside * farthest) found->farthest_outliers.push_back(found->outliers[j]);
+    if (off[j] > kNoiseRules.beside_farthest * farthest)
+      found->farthest_outliers.push_back(found->outliers[j]);
 }
 
 }  // namespace
@@ -109,9 +99,11 @@ bool NoiseSearch::Possible(Kind kind) const {
 }
 
 double NoiseSearch::Threshold(Kind kind) const {
-  if (Declared(kind)) return kAlreadyNats;
+  if (Declared(kind)) return kNoiseRules.declared_gain;
   const double further = kind == kChannels ? sample_.channels - 2 : 0;
-  return (sample_.repeats.size() >= kMinRepeats || kind == kGrowth ? kEnterNats : kWithoutRepeatsNats) +
+  return (sample_.repeats.size() >= kNoiseRules.min_repeats || kind == kGrowth
+              ? kNoiseRules.enter.value()
+              : kNoiseRules.without_repeats.value()) +
          further;
 }
 
@@ -124,13 +116,14 @@ NoiseSearch::Description NoiseSearch::Fit(Kind kind, const Description& from) co
     return ProfileSigma(sample_.groups, &model);
   };
   if (kind == kGrowth) {
-    at(Maximise(at, std::log(kMinSlope), std::log(kMaxSlope), 20, &trial.log_likelihood));
+    at(Maximise(at, std::log(kNoiseRules.min_slope.value()), std::log(kNoiseRules.max_slope.value()), 20,
+                &trial.log_likelihood));
   } else if (kind == kLength) {
     // A noise of lengths alone is simpler than one beside a noise of times.
     double beside = 0;
     const double share = Maximise(at, 0, 1, 20, &beside);
     trial.log_likelihood = at(1);
-    if (trial.log_likelihood < beside - kSimplerNats) trial.log_likelihood = at(share);
+    if (trial.log_likelihood < beside - kNoiseRules.times_beside_lengths) trial.log_likelihood = at(share);
   } else {
     FitChannels(&trial);
   }
@@ -155,27 +148,27 @@ void NoiseSearch::FitChannels(Description* trial) const {
   double one_log_likelihood = -INFINITY;
   for (size_t channel = 0; channel < alike.size(); ++channel) {
     scales = alike;
-    for (const double range : {std::log(kMaxScale), 0.3, 0.05}) climb(channel, range);
+    for (const double range : {std::log(kNoiseRules.max_scale.value()), 0.3, 0.05}) climb(channel, range);
     if (trial->log_likelihood <= one_log_likelihood) continue;
     one_log_likelihood = trial->log_likelihood;
     one = scales;
   }
   // From the best single one on, so that all of them are never worse.
   scales = one;
-  for (const double range : {std::log(kMaxScale), 0.3, 0.05})
+  for (const double range : {std::log(kNoiseRules.max_scale.value()), 0.3, 0.05})
     for (size_t channel = 0; channel < alike.size(); ++channel) climb(channel, range);
-  if (trial->log_likelihood < one_log_likelihood + kAlreadyNats) scales = one;
+  if (trial->log_likelihood < one_log_likelihood + kNoiseRules.declared_gain) scales = one;
   const double quietest = *std::min_element(scales.begin(), scales.end());
   for (double& scale : scales) scale /= quietest;
   trial->log_likelihood = ProfileSigma(sample_.groups, &trial->model);
 }
 
 bool NoiseSearch::RepeatsAgree(const NoiseModel& with, const NoiseModel& without, double gain_nats) const {
-  if (sample_.repeats.size() < kMinRepeats) return true;
+  if (sample_.repeats.size() < kNoiseRules.min_repeats) return true;
   NoiseModel one = with, other = without;
   one.shape = other.shape = NoiseShape::kGaussian;
   const double repeats_nats = ProfileSigma(sample_.repeats, &one) - ProfileSigma(sample_.repeats, &other);
-  return repeats_nats > std::max(kRepeatsNats, kRepeatsShare * gain_nats);
+  return repeats_nats > std::max(kNoiseRules.repeats_gain.value(), kNoiseRules.repeats_share * gain_nats);
 }
 
 // Forward selection among what the scale may depend on.
@@ -197,8 +190,9 @@ NoiseSearch::Description NoiseSearch::WithKinds(Description from) const {
 }
 
 bool NoiseSearch::TailsLookHeavy(const NoiseModel& model) const {
-  return Kurtosis(sample_.groups, model) > kKurtosisSigmas &&
-         (sample_.repeats.size() < kMinRepeats || Kurtosis(sample_.repeats, model) > kRepeatsKurtosisSigmas);
+  return Kurtosis(sample_.groups, model) > kNoiseRules.kurtosis &&
+         (sample_.repeats.size() < kNoiseRules.min_repeats ||
+          Kurtosis(sample_.repeats, model) > kNoiseRules.repeats_kurtosis);
 }
 
 NoiseSearch::Description NoiseSearch::FitStudent(const Description& from) const {
@@ -240,16 +234,16 @@ NoiseSearch::Description NoiseSearch::WithTails(const Description& plain) const 
   const double before = ProfileSigma(part_, &gaussian);
   Description student = FitStudent(from), mixture = FitMixture(from);
   student.tails.gain_nats = student.log_likelihood - before;
-  if (student.tails.gain_nats >= kEnterNats && student.log_likelihood >= mixture.log_likelihood - 3)
+  if (student.tails.gain_nats >= kNoiseRules.enter && student.log_likelihood >= mixture.log_likelihood - 3)
     return student;
-  return mixture.log_likelihood - before >= kEnterNats ? mixture : plain;
+  return mixture.log_likelihood - before >= kNoiseRules.enter ? mixture : plain;
 }
 
 // Log likelihood on the part, less what the parameters must earn.
 double NoiseSearch::Score(const Description& description) const {
   NoiseModel model = description.model;
   double score =
-      description.gaussian() ? ProfileSigma(part_, &model) : description.log_likelihood - kEnterNats;
+      description.gaussian() ? ProfileSigma(part_, &model) : description.log_likelihood - kNoiseRules.enter;
   for (const Kind kind : {kGrowth, kLength, kChannels})
     if (description.has[kind]) score -= Threshold(kind);
   return score;
@@ -289,7 +283,6 @@ void NoiseSearch::DescribeGrowth() {
 
 // The two parts of a variance, times and lengths.
 void NoiseSearch::DescribeLength() {
-  constexpr double kStep = 0.02;
   NoiseModel at = best_.model;
   const auto by_share = [&](double share) {
     at.length_share = share;
@@ -297,8 +290,10 @@ void NoiseSearch::DescribeLength() {
     return ProfileSigma(GroupsOfShape(), &at);
   };
   const double share = best_.model.length_share;
-  const double error =
-      std::max(CurvatureError(by_share, std::clamp(share, kStep, 1 - kStep), kStep), 1 / shape_dof());
+  const double error = std::max(
+      CurvatureError(by_share, std::clamp(share, kNoiseRules.share_step.value(), 1 - kNoiseRules.share_step),
+                     kNoiseRules.share_step.value()),
+      1 / shape_dof());
   const auto root_error = [&](double part) { return error / (2 * std::sqrt(std::max(part, error))); };
   const double length_m = best_.model.sigma_s / sample_.rms_slowness_s_per_m;
   found_->length_sigma_m = {length_m * std::sqrt(share),

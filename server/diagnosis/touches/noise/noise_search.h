@@ -22,9 +22,6 @@ class NoiseSearch {
   double shape_dof() const;
 
  private:
-  static constexpr double kAlreadyNats = 3;   // gain in log likelihood that a declared parameter needs
-  static constexpr double kExcludedNats = 5;  // loss that rules a declared value out
-
   // What the scale of a reading may depend on.
   enum Kind { kGrowth, kLength, kChannels, kKinds };
   struct Description {

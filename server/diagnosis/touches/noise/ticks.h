@@ -7,9 +7,6 @@
 
 namespace touchstone::diagnosis::touches {
 
-inline constexpr double kTickToleranceS = 1.01e-6;  // files keep whole microseconds
-inline constexpr double kMinTickS = 20e-6;
-
 // The tick that `differences` of times (s, sorted) lie on, near `interval_s`; 0 if they lie on none.
 double RefinedTick(const std::vector<double>& differences, double interval_s);
 
