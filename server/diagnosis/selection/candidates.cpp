@@ -3,12 +3,11 @@
 #include <algorithm>
 
 #include "server/diagnosis/engine/fit/parameterization.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr size_t kMaxObjectsVaried = 12;  // with a value each, of effects that seldom differ between objects
 
 engine::Candidate MakeCandidate(std::shared_ptr<const model::Effect> effect, bool per_object, bool of_user) {
   engine::Candidate candidate;
@@ -30,7 +29,7 @@ std::vector<engine::Candidate> MakeCandidates(const DiagnosisInput& input,
     if (effect->needs.session_time && !input.set->has_session_time) continue;
     candidates.push_back(MakeCandidate(effect, effect->always_per_object, false));
     if (searched.objects.size() < 2 || effect->always_per_object) continue;
-    if (effect->often_per_object || searched.objects.size() <= kMaxObjectsVaried) {
+    if (effect->often_per_object || searched.objects.size() <= kSelectionRules.max_objects_varied) {
       candidates.push_back(MakeCandidate(effect, true, false));
       candidates.back().rare = !effect->often_per_object;
     }

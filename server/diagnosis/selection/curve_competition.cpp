@@ -6,24 +6,14 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMaxCovariatesTried = 3;
-constexpr double kSimplerNats = 3;  // an effect must be worth this much beside a curve
-constexpr double kFormulaNats = 5;  // a formula this near says the same in fewer words
-constexpr double kMemoryNats = 10;  // noise with memory must be ahead of a curve, a step and a period by this
-constexpr double kRougherNats = 3;  // ... and than a course without corners
-constexpr double kOvertakenNats = 3;  // a curve alone that is this much better takes a named effect's place
-
-constexpr double kBeyondCorrelatedNats =
-    60;  // an effect worth as much is no mean or trend of correlated noise
-constexpr double kWorthUnderMemoryNats = 10;
-constexpr double kDroppedNats = 15;  // that it must be better by for each named effect it needs beside it
 
 // A fit of named effects, and a curve over it.
 struct WithCurve {
@@ -50,7 +40,7 @@ class Competition {
     TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named));
     std::vector<WithCurve> found;
     for (const NamelessCurve& curve : result_.curves) {
-      if (found.size() == kMaxCovariatesTried || !IsSignificant(curve)) break;
+      if (static_cast<int>(found.size()) == kSelectionRules.max_curves_tried || !IsSignificant(curve)) break;
       WithCurve with{named, curve};
       TOUCHSTONE_RETURN_IF_ERROR(DropSuperfluous(&with));
       found.push_back(std::move(with));
@@ -131,7 +121,7 @@ class Competition {
   // The mean and trend of correlated noise look like a constant and a drift of each finger.
   absl::Status NoteCorrelatedNoise(int index, const engine::Fit& named, const engine::Fit& without) {
     const model::Effect& effect = *named.model.base().effects[index].effect;
-    if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kBeyondCorrelatedNats)
+    if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kSelectionRules.beyond_correlated)
       return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> with, MemoryOf(named));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> alone, MemoryOf(without));
@@ -166,7 +156,8 @@ class Competition {
       return IsPerFinger(*named.model.base().effects[index].effect);
     });
     const double with_nats = named.log_evidence + std::max(0.0, beside[0].gain_nats);
-    return with_nats - without_nats > (per_finger ? kBeyondCorrelatedNats : kSimplerNats);
+    return with_nats - without_nats >
+           (per_finger ? kSelectionRules.beyond_correlated.value() : kSelectionRules.beside_curve.value());
   }
 
   // Takes the effects out where a curve in their place is ahead of them; else notes by how much it is behind.
@@ -197,7 +188,8 @@ class Competition {
     for (const std::string& name : names)
       NoteRival(name, behind + curves[0].any_gain_nats - any_beside, RivalInWords(curves[0]));
     if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteCorrelatedNoise(steps[0], *named, without));
-    if (stands || !IsSignificant(curves[0]) || behind + curves[0].gain_nats < kOvertakenNats) return false;
+    if (stands || !IsSignificant(curves[0]) || behind + curves[0].gain_nats < kSelectionRules.overtaken)
+      return false;
     *named = std::move(without);
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(*named, ""));
     return true;
@@ -217,7 +209,7 @@ class Competition {
                                     CurvesOver(trial.fit, with->curve.covariate));
         if (curves.empty()) continue;
         trial.curve = curves[0];
-        if (trial.total() < (dropped ? best.total() : with->total() - kSimplerNats)) continue;
+        if (trial.total() < (dropped ? best.total() : with->total() - kSelectionRules.beside_curve)) continue;
         best = std::move(trial);
         dropped = true;
       }
@@ -232,10 +224,10 @@ class Competition {
     if (!memory) return false;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(with.fit));
     const double course = std::max({with.curve.gain_nats, memory->step_gain_nats, memory->period_gain_nats});
-    if (declared ? course > memory->gain_nats + kMemoryNats ||
-                       memory->smooth_gain_nats > memory->gain_nats + kMemoryNats
-                 : !memory->everywhere || memory->gain_nats < course + kMemoryNats ||
-                       memory->gain_nats < memory->smooth_gain_nats + kRougherNats)
+    if (declared ? course > memory->gain_nats + kSelectionRules.memory_ahead ||
+                       memory->smooth_gain_nats > memory->gain_nats + kSelectionRules.memory_ahead
+                 : !memory->everywhere || memory->gain_nats < course + kSelectionRules.memory_ahead ||
+                       memory->gain_nats < memory->smooth_gain_nats + kSelectionRules.memory_rougher)
       return false;
     result_.fit = with.fit;
     TOUCHSTONE_RETURN_IF_ERROR(DropWhatIsCorrelated(&*memory));
@@ -264,7 +256,8 @@ class Competition {
       TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
                                   engine::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
       TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> other, MemoryOf(without));
-      if (!other || other->log_likelihood < memory->log_likelihood - kWorthUnderMemoryNats) continue;
+      if (!other || other->log_likelihood < memory->log_likelihood - kSelectionRules.worth_under_memory)
+        continue;
       result_.fit = std::move(without);
       *memory = *other;
     }
@@ -278,7 +271,7 @@ class Competition {
     TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                                 workspace_.searched_predictor->Run(named.model.base(), false, false));
     const touches::Observations& o = *workspace_.searched;
-    if (!declared && !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kTimeStructureP))
+    if (!declared && !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kSessionRules.time_p))
       return absl::OkStatus();
     return IsNoiseWithMemory({named, NamelessCurve()}).status();
   }
@@ -289,7 +282,8 @@ class Competition {
       return static_cast<double>(fit.model.base().effects.size()) - result_.initial_effects;
     };
     const double dropped = named(result_.without_formula) - named(with.fit);
-    return result_.fit.log_evidence > with.total() - kFormulaNats + kDroppedNats * dropped;
+    return result_.fit.log_evidence >
+           with.total() - kSelectionRules.formula_behind + kSelectionRules.dropped * dropped;
   }
 
   // The formula stays; a curve of its covariate is given beside it.

@@ -15,28 +15,17 @@
 #include "server/base/text/readable_time.h"
 #include "server/base/text/value_text.h"
 #include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/diagnosis/selection/session/repeats.h"
 #include "server/diagnosis/selection/session/round_structure.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/diagnosis/selection/session/session_parts.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kDifferenceP = 1e-5;  // by chance, over all that is tried
-constexpr double kStretchP = 1e-8;     // ... of a stretch: scatter that moves all fingers together gave 2e-6
-constexpr double kRestIsMoreP =
-    1e-4;                         // of the scatter that an effect leaves in its part, over that of the others
-constexpr double kAheadNats = 6;  // of what else explains what repeats differ by
-constexpr double kSameNats = 3;   // explanations as near as this are named together
-constexpr double kMinRepeatDegrees = 40;
 constexpr double kMinSumOfSquares = 1e-300;
-constexpr int kOrders = 199;
-constexpr int kSteps = 4;           // of Gauss and Newton
-constexpr double kVisible = 1e-6;   // share of a column's square that differs within poses
-constexpr double kClearErrors = 3;  // of a value that is worth a word
-constexpr double kMaxLeft = 0.98;   // of the squares, by what describes a difference
-constexpr size_t kMaxPartsNamed = 2, kMaxAlso = 3;
 
 // One effect in one part.
 struct Difference {
@@ -56,20 +45,23 @@ class DifferenceSearch {
         repeats_(*workspace.searched, *workspace.contrasts) {}
 
   absl::StatusOr<std::optional<GroupDifference>> Run() {
-    if (repeats_.degrees() < kMinRepeatDegrees) return std::nullopt;
+    if (repeats_.degrees() < kSelectionRules.min_difference_dof) return std::nullopt;
     const double given2 = repeats_.Centred(columns_.given.columns.values.col(0)).squaredNorm();
     // What files and meshes are rounded to has a pattern, and no cause.
     if (std::sqrt(given2 / repeats_.degrees()) < RoundingS(*workspace_.searched)) return std::nullopt;
     ListParts();
     // In the place of all that was found; else beside it, where that has a name: what a curve misses is no part.
     std::vector<Difference> all = TryAll(columns_.given);
-    if (all.empty() || all[0].gain_nats < kAheadNats + NatsOfFound(parts_[all[0].part].of_rounds)) {
+    if (all.empty() ||
+        all[0].gain_nats < kSelectionRules.ahead + NatsOfFound(parts_[all[0].part].of_rounds)) {
       if (found_.formula >= 0 || NamelessNats() > 0) return std::nullopt;
       all = TryAll(found_.fit);
-      if (all.empty() || all[0].gain_nats < kAheadNats) return std::nullopt;
+      if (all.empty() || all[0].gain_nats < kSelectionRules.ahead) return std::nullopt;
     }
     const double p = ChanceOf(all[0]);
-    if (p > (parts_[all[0].part].of_rounds ? kDifferenceP : kStretchP)) return std::nullopt;
+    if (p > (parts_[all[0].part].of_rounds ? kSelectionRules.difference_p.value()
+                                           : kSelectionRules.stretch_p.value()))
+      return std::nullopt;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool otherwise, SomethingElse(all[0]));
     if (otherwise) return std::nullopt;
     return Describe(all, p);
@@ -146,7 +138,7 @@ class DifferenceSearch {
       for (int part = 0; part < static_cast<int>(parts_.size()); ++part) {
         Difference d{effect, part, 0, 0, static_cast<int>(columns_.effects[effect].columns.cols())};
         const Eigen::MatrixXd columns = ColumnsOf(d);
-        if (!(columns.squaredNorm() > kVisible * whole)) continue;
+        if (!(columns.squaredNorm() > kSelectionRules.visible * whole)) continue;
         const Eigen::VectorXd right = columns.transpose() * residuals_;
         d.explained = right.dot(SymmetricSolver(columns.transpose() * columns).Solve(right));
         if (!(d.explained > 0)) continue;
@@ -186,12 +178,12 @@ class DifferenceSearch {
     const Eigen::VectorXd left = residuals_ - basis * (basis.transpose() * residuals_);
     RandomStream random(workspace_.input.seed, RandomDomain::kDiagnosis);
     double sum = 0, sum2 = 0;
-    for (int n = 0; n < kOrders; ++n) {
+    for (int n = 0; n < kSelectionRules.orders; ++n) {
       const double explained = (basis.transpose() * repeats_.Shuffled(left, &random)).squaredNorm();
       sum += explained, sum2 += explained * explained;
     }
-    const double mean = sum / kOrders;
-    return {mean, (sum2 - sum * mean) / (kOrders - 1)};
+    const double mean = sum / kSelectionRules.orders;
+    return {mean, (sum2 - sum * mean) / (kSelectionRules.orders - 1)};
   }
 
   // An object that lay elsewhere in every round, or what changes slowly: a part is not the whole of it.
@@ -201,11 +193,11 @@ class DifferenceSearch {
                                 workspace_.searched_predictor->Run(base_->model.base(), true, false));
     const std::vector<double> residuals = touches::Residuals(o, details);
     const RoundStructure rounds = FindRoundStructure(o, details, residuals);
-    if (rounds.p < kDifferenceP && rounds.gain_nats > d.gain_nats) return true;
+    if (rounds.p < kSelectionRules.difference_p && rounds.gain_nats > d.gain_nats) return true;
     const Eigen::MatrixXd columns = repeats_.Only(columns_.effects[d.effect].columns, has_[d.part]);
     const std::vector<double> corrected = workspace_.contrasts->PerFinger(
         base_->columns.values.col(0) - columns * SolutionOf(d), o.time_s.size());
-    return FindTimeStructure(o, corrected).p < kTimeStructureP;
+    return FindTimeStructure(o, corrected).p < kSessionRules.time_p;
   }
 
   Eigen::VectorXd SolutionOf(const Difference& d) const {
@@ -226,10 +218,12 @@ class DifferenceSearch {
       if (parts_[best.part].has[k]) found.rows.push_back(o.row[k]);
     std::vector<std::string> places = {found.part};
     for (const Difference& other : all) {
-      if (other.gain_nats < best.gain_nats - kSameNats) break;
-      if (other.part == best.part && other.effect != best.effect && found.also.size() < kMaxAlso)
+      if (other.gain_nats < best.gain_nats - kSelectionRules.same) break;
+      if (other.part == best.part && other.effect != best.effect &&
+          found.also.size() < kSelectionRules.max_also)
         found.also.push_back(NameOf(other));
-      if (other.effect == best.effect && other.part != best.part && places.size() < kMaxPartsNamed)
+      if (other.effect == best.effect && other.part != best.part &&
+          places.size() < kSelectionRules.max_parts_named)
         places.push_back(parts_[other.part].words);
     }
     found.words = InWords(found, places, best, fitted.left);
@@ -255,7 +249,7 @@ class DifferenceSearch {
     const std::vector<char>& has = has_[d.part];
     const Eigen::VectorXd elsewhere =
         base_->columns.values.col(0) - repeats_.Only(base_->columns.values.leftCols(1), has);
-    for (int step = 0; step < kSteps; ++step) {
+    for (int step = 0; step < kSelectionRules.part_steps; ++step) {
       engine::Parameterization there = fitted.start;
       Eigen::VectorXd point = there.Start();
       point.tail(d.values) += fitted.more;
@@ -271,7 +265,7 @@ class DifferenceSearch {
       fitted.left = left;
       fitted.more = at.point.tail(d.values) - fitted.start.Start().tail(d.values);
       fitted.columns = repeats_.Centred(repeats_.Only(at.columns.values.rightCols(d.values), has));
-      if (step + 1 < kSteps) fitted.more += SolveLeastSquares(fitted.columns, left);
+      if (step + 1 < kSelectionRules.part_steps) fitted.more += SolveLeastSquares(fitted.columns, left);
     }
     return fitted;
   }
@@ -301,20 +295,20 @@ class DifferenceSearch {
     const double there = repeats_.Only(left, has).squaredNorm(), elsewhere = left.squaredNorm() - there;
     const double dof = share * repeats_.degrees() - d.values, others = (1 - share) * repeats_.degrees();
     return dof >= 1 && elsewhere > 0 &&
-           FisherTail(there / dof / (elsewhere / others), dof, others) < kRestIsMoreP;
+           FisherTail(there / dof / (elsewhere / others), dof, others) < kSelectionRules.rest_is_more_p;
   }
 
   std::string InWords(const GroupDifference& found, const std::vector<std::string>& places,
                       const Difference& d, const Eigen::VectorXd& left) const {
     std::vector<std::string> values;
     for (const engine::ParameterEstimate& value : found.more)
-      if (std::abs(value.value) > kClearErrors * value.std_error)
+      if (std::abs(value.value) > kSelectionRules.clear_errors * value.std_error)
         values.push_back(absl::StrCat(
             value.name, value.entry.empty() ? "" : " ", value.entry, value.value > 0 ? " +" : " ",
             ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
     std::string words = absl::StrCat("Something was other ", absl::StrJoin(places, ", or "));
-    if (values.empty() || left.squaredNorm() > kMaxLeft * residuals_.squaredNorm()) {
+    if (values.empty() || left.squaredNorm() > kSelectionRules.max_left * residuals_.squaredNorm()) {
       absl::StrAppend(&words, ", and no effect says what: touches of one pose differ by ",
                       scatter(residuals_.squaredNorm()), " where those are among them");
     } else {

@@ -6,11 +6,10 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
+#include "server/diagnosis/selection/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kMinDegreesOfFreedom = 8;
 
 // Without repeats: how much better a smooth remainder explains the residuals than none.
 double SmoothRemainderP(const Workspace& workspace, const engine::Fit& fit) {
@@ -31,11 +30,11 @@ double RoundingS(const touches::Observations& o) {
   for (int k = 0; k < o.size(); ++k)
     if (const double speed_m_s = o.set->speed_m_s[o.row[k]]; o.used[k] && speed_m_s > 0)
       squares += 1 / (speed_m_s * speed_m_s), count += 1;
-  return count > 0 ? kRoundingM * std::sqrt(squares / count) : 0;
+  return count > 0 ? kSelectionRules.rounding.value() * std::sqrt(squares / count) : 0;
 }
 
 bool HasRepeats(const touches::SumOfSquares& error) {
-  return error.degrees_of_freedom >= kMinDegreesOfFreedom;
+  return error.degrees_of_freedom >= kSelectionRules.min_repeat_dof;
 }
 
 double LackOfFitP(const touches::Observations& o, const std::vector<double>& residuals, double parameters) {

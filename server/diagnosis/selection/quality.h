@@ -6,7 +6,7 @@
 
 namespace touchstone::diagnosis::selection {
 
-// What times are off by because numbers of files and meshes are rounded (kRoundingM), s: the least that a floor can be.
+// What times are off by because numbers of files and meshes are rounded, s: the least that a floor can be.
 double RoundingS(const touches::Observations& observations);
 
 // F test of residuals against the scatter of repeats; `parameters` of the model were fitted. 1 without repeats or

@@ -6,12 +6,11 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/selection/rules.h"
 
 namespace touchstone::diagnosis::selection {
 
 void LeaveOutWild(Workspace* workspace) {
-  constexpr double kWild = 100;  // robust standard deviations
-  constexpr double kFewShare = 0.005;
   constexpr double kSigmaOverMedian = 1.4826;
   touches::Observations& o = *workspace->observations;
   const std::vector<double> residuals = touches::Residuals(o, workspace->nominal);
@@ -25,11 +24,13 @@ void LeaveOutWild(Workspace* workspace) {
   }
   if (used.empty()) return;
   std::nth_element(used.begin(), used.begin() + static_cast<long>(used.size() / 2), used.end());
-  const double bound = kWild * kSigmaOverMedian * used[used.size() / 2];
+  const double bound = kSelectionRules.wild * kSigmaOverMedian * used[used.size() / 2];
   std::vector<int> wild;
   for (int k = 0; k < o.size(); ++k)
     if (o.used[k] && bound > 0 && largest[k] > bound) wild.push_back(k);
-  if (static_cast<double>(wild.size()) > std::max(1.0, kFewShare * static_cast<double>(used.size()))) return;
+  if (static_cast<double>(wild.size()) >
+      std::max(1.0, kSelectionRules.few_wild * static_cast<double>(used.size())))
+    return;
   for (const int k : wild) touches::LeaveOut(&o, k, touches::kOutlierReason);
 }
 

@@ -12,6 +12,7 @@
 #include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/group_difference.h"
 #include "server/diagnosis/selection/revised_touches.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/touches_nothing_missing.h"
 #include "server/diagnosis/selection/unsupported_steps.h"
@@ -19,12 +20,6 @@
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kTermsFitted = 3;
-constexpr int kMaxFormulaTerms = 2;
-constexpr int kPasses = 3;
-constexpr double kAsGoodNats =
-    0.5;  // behind a fit that was extended, one that was searched anew is preferred
 
 // The best fit with one more term of the dictionary, if it is worth its complexity.
 struct WithTerm {
@@ -57,7 +52,7 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::Step
   double best_evidence = rival.log_evidence + search.rules().enter_nats + penalty_nats;
   int fitted = 0;
   for (const FormulaTerm& candidate : terms) {
-    if (fitted++ == kTermsFitted || candidate.gain_nats < 0.5 * penalty_nats) break;
+    if (fitted++ == kSelectionRules.terms_fitted || candidate.gain_nats < 0.5 * penalty_nats) break;
     FormulaTerm term = candidate;
     engine::Parameterization base = without.fit.model;
     if (first != nullptr) {
@@ -140,11 +135,11 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
     known.initial_effects = initial_effects;
     known.fit.model = *before;
     TOUCHSTONE_ASSIGN_OR_RETURN(known, search.Continue(std::move(known)));
-    if (known.fit.log_evidence > best.fit.log_evidence + kAsGoodNats) best = std::move(known);
+    if (known.fit.log_evidence > best.fit.log_evidence + kSelectionRules.as_good) best = std::move(known);
   }
   result->formula = -1;
   FormulaTerm* first = nullptr;
-  for (int terms = 0; terms < kMaxFormulaTerms; ++terms) {
+  for (int terms = 0; terms < kSelectionRules.max_formula_terms; ++terms) {
     TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(workspace, search, best, first, best.fit));
     if (!with.found && terms == 0) {
       TOUCHSTONE_ASSIGN_OR_RETURN(with, TryTermsInPlaceOfEffects(workspace, best, result));
@@ -157,7 +152,7 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
     start.Add(*effect, false);
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation again, search.Run(start, initial_effects));
     // It may have led the search to effects that do without it.
-    const bool better = again.fit.log_evidence > with.explanation.fit.log_evidence - kAsGoodNats;
+    const bool better = again.fit.log_evidence > with.explanation.fit.log_evidence - kSelectionRules.as_good;
     best = std::move(better ? again : with.explanation);
     result->formula = FindFormula(best.fit, initial_effects, NameOfRest(with.term.covariate));
     result->term = with.term;
@@ -231,7 +226,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
   std::optional<GroupDifference> group;
   std::optional<engine::Parameterization> before;
   LeaveOutWild(workspace);
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kSelectionRules.passes; ++pass) {
     TOUCHSTONE_RETURN_IF_ERROR(PrepareSearch(workspace, weights));
     result = SelectionResult();
     result.search = std::make_unique<engine::StepwiseSearch>(
@@ -252,7 +247,7 @@ absl::StatusOr<SelectionResult> SelectExplanation(Workspace* workspace) {
       }
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(result.noise, NoiseOf(*workspace, result.fit));
-    if (pass + 1 == kPasses) break;
+    if (pass + 1 == kSelectionRules.passes) break;
     const std::vector<int>& outliers = pass == 0 ? result.noise.farthest_outliers : result.noise.outliers;
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool revised, ReviseTouches(result, outliers, workspace, &weights));
     if (!revised) break;

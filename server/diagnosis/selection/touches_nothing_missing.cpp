@@ -8,7 +8,9 @@
 #include "server/base/status.h"
 #include "server/diagnosis/selection/curves/nameless_curve.h"
 #include "server/diagnosis/selection/quality.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/diagnosis/selection/session/turns.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/diagnosis/touches/noise/rules.h"
@@ -16,9 +18,6 @@
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kSimulatedDraws = 99;
-constexpr int kCurveDegree = 3;
 
 // Whether the model says more of the noise than that it is normal and the same for all.
 bool HasShapedNoise(const model::Model& model) {
@@ -79,11 +78,12 @@ class Tester {
     for (const CurveCovariate& covariate : ListCurveCovariates(o_, details_)) {
       const auto [mean, deviation] = MeanAndDeviation(covariate);
       if (!(deviation > 0)) continue;
-      AddPerFinger(o_.fingers * (kCurveDegree + 1),
+      AddPerFinger(o_.fingers * (kSelectionRules.curve_degree + 1),
                    [&, mean = mean, deviation = deviation](int k, int i, int column) {
                      const double value = (covariate.value(k, i) - mean) / deviation;
-                     if (column / (kCurveDegree + 1) != i || !std::isfinite(value)) return 0.0;
-                     return std::pow(value, column % (kCurveDegree + 1)) *
+                     if (column / (kSelectionRules.curve_degree + 1) != i || !std::isfinite(value))
+                       return 0.0;
+                     return std::pow(value, column % (kSelectionRules.curve_degree + 1)) *
                             details_.inverse_speed_s_per_m[static_cast<size_t>(k) * o_.fingers + i];
                    });
     }
@@ -92,7 +92,7 @@ class Tester {
   // A mean of each finger at each place in a turn.
   void AddTurns() {
     const std::vector<int> places = PlacesInSession(*o_.set);
-    for (int period = 2; period <= kLongestTurn; ++period)
+    for (int period = 2; period <= kSessionRules.longest_turn; ++period)
       AddPerFinger(o_.fingers * period, [&](int k, int i, int column) {
         return column == i * period + places[o_.row[k]] % period ? 1.0 : 0.0;
       });
@@ -138,10 +138,10 @@ class Tester {
     const Eigen::VectorXd data = given_.columns.values.col(0);
     if (!HasShapedNoise(*workspace_.input.model))
       return engine::DataAndNoise(*workspace_.rows, data, workspace_.input.seed);
-    Eigen::MatrixXd residuals(contrasts_.rows(), 1 + kSimulatedDraws);
+    Eigen::MatrixXd residuals(contrasts_.rows(), 1 + kSelectionRules.simulated_draws);
     residuals.col(0) = data;
     const model::Model drawn_from = WithoutDropouts(*workspace_.input.model);
-    for (int draw = 1; draw <= kSimulatedDraws; ++draw) {
+    for (int draw = 1; draw <= kSelectionRules.simulated_draws; ++draw) {
       TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> noise_s,
                                   workspace_.searched_predictor->Draw(drawn_from, draw));
       for (size_t e = 0; e < noise_s.size(); ++e) {

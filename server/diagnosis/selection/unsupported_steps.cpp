@@ -2,11 +2,10 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
+#include "server/diagnosis/selection/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kImprobable = 0.05;  // of a step, with its equivalents
 
 bool HasOwnValues(const engine::Fit& fit, int index) {
   return fit.model.base().effects[index].per_object;
@@ -61,7 +60,7 @@ absl::StatusOr<bool> DropImprobable(const Workspace& workspace, SelectionResult*
   if (result->formula < 0 && !result->curve) return false;
   bool dropped = false;
   for (auto step = result->steps.rbegin(); step != result->steps.rend(); ++step) {
-    if (step->probability >= kImprobable) continue;
+    if (step->probability >= kSelectionRules.improbable) continue;
     TOUCHSTONE_RETURN_IF_ERROR(TakeOut(workspace, step->effect, result));
     dropped = true;
   }

@@ -10,18 +10,10 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kMaxMissed = 0.5;  // share of an object's touches
-constexpr double kWarnMissed = 0.05;
-constexpr double kOutsideM = 1e-6;   // of the mesh's box: less is rounding
-constexpr double kMaxTravel = 2.5;   // over the standoff: whoever goes farther has met nothing at the target
-constexpr double kUnitFactor = 100;  // measured over predicted spread that no effect could give
-constexpr double kEdgeM = 0.3e-3;    // contacts this near an edge are left out
-constexpr double kEdgeJumpM = 0.5e-3;  // what makes a step an edge: second difference of the travel
-constexpr int kMinRepeats = 4;         // of a pose that is searched: its scatter tells noise from misfit
 
 // A mesh that most touches miss is not the mesh that was touched.
 absl::Status CheckMeshes(const touches::Observations& o, const touches::Prediction& nominal,
@@ -33,7 +25,8 @@ absl::Status CheckMeshes(const touches::Observations& o, const touches::Predicti
     ++touches[o.object[k]];
     bool misses = false;
     for (size_t e = static_cast<size_t>(k) * o.fingers; e < static_cast<size_t>(k + 1) * o.fingers; ++e)
-      misses |= !std::isnan(o.time_s[e]) && !(nominal.travel_m[e] < kMaxTravel * o.set->standoff_m[o.row[k]]);
+      misses |= !std::isnan(o.time_s[e]) &&
+                !(nominal.travel_m[e] < kSelectionRules.max_travel * o.set->standoff_m[o.row[k]]);
     missed[o.object[k]] += misses;
     const geometry::Bounds& bounds = o.surfaces[o.object[k]]->bounds();
     const Eigen::Vector3d& target = o.set->target_m[o.row[k]];
@@ -41,17 +34,18 @@ absl::Status CheckMeshes(const touches::Observations& o, const touches::Predicti
     off_m[o.object[k]] = std::max(off_m[o.object[k]], outside.norm());
   }
   for (size_t object = 0; object < o.objects.size(); ++object) {
-    if (touches[object] == 0 || missed[object] <= kWarnMissed * touches[object]) continue;
+    if (touches[object] == 0 || missed[object] <= kSelectionRules.warn_missed * touches[object]) continue;
     const geometry::Bounds& bounds = o.surfaces[object]->bounds();
     const Eigen::Vector3d size_mm = (bounds.max_m - bounds.min_m) * kMillimetresPerMetre;
     const std::string text = absl::StrFormat(
         "object '%s': in %d of %d touches a finger reported that in the model misses the mesh or meets it "
         "far behind the target. The mesh measures %.4g x %.4g x %.4g mm%s",
         o.objects[object], missed[object], touches[object], size_mm.x(), size_mm.y(), size_mm.z(),
-        off_m[object] > kOutsideM ? absl::StrFormat(", and targets lie up to %.3g mm outside of it",
-                                                    off_m[object] * kMillimetresPerMetre)
-                                  : "; every target lies within it");
-    if (missed[object] > kMaxMissed * touches[object])
+        off_m[object] > kSelectionRules.outside
+            ? absl::StrFormat(", and targets lie up to %.3g mm outside of it",
+                              off_m[object] * kMillimetresPerMetre)
+            : "; every target lies within it");
+    if (missed[object] > kSelectionRules.max_missed * touches[object])
       return absl::InvalidArgumentError(absl::StrCat(o.set->origin, ": ", text,
                                                      ". Is it this object's mesh, in mm, with z up? (--mesh ",
                                                      o.objects[object], "=FILE,unit=mm,up=z)"));
@@ -80,7 +74,8 @@ absl::Status CheckUnits(const touches::Observations& o, const touches::Predictio
     return (*values)[values->size() / 2];
   };
   const double m = median(&measured), p = median(&predicted);
-  if (!(m > 0 && p > 0) || (m < kUnitFactor * p && p < kUnitFactor * m)) return absl::OkStatus();
+  if (!(m > 0 && p > 0) || (m < kSelectionRules.unit_factor * p && p < kSelectionRules.unit_factor * m))
+    return absl::OkStatus();
   const double speed_mm_s = o.set->speed_m_s[0] * kMillimetresPerMetre;
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s: the fingers' times differ by %.3g us in a typical touch, but at %.4g mm/s the model expects %.3g "
@@ -128,8 +123,10 @@ void LeaveOutMissed(const touches::Prediction& prediction, touches::Observations
 absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const model::Model& model,
                                   touches::Observations* o) {
   std::vector<std::vector<double>> travels;
-  for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(kEdgeM, 0.0), std::pair(-kEdgeM, 0.0),
-                             std::pair(0.0, kEdgeM), std::pair(0.0, -kEdgeM)}) {
+  for (const auto& [x, y] :
+       {std::pair(0.0, 0.0), std::pair(kSelectionRules.edge.value(), 0.0),
+        std::pair(-kSelectionRules.edge.value(), 0.0), std::pair(0.0, kSelectionRules.edge.value()),
+        std::pair(0.0, -kSelectionRules.edge.value())}) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> travel, predictor.TravelWhenMoved(model, x, y));
     travels.push_back(std::move(travel));
   }
@@ -141,7 +138,7 @@ absl::StatusOr<int> LeaveOutEdges(const touches::Predictor& predictor, const mod
       if (std::isnan(o->time_s[e]) || std::isnan(travels[0][e])) continue;
       for (const int axis : {1, 3}) {
         const double bend = travels[axis][e] + travels[axis + 1][e] - 2 * travels[0][e];
-        edge |= !(std::abs(bend) < kEdgeJumpM);
+        edge |= !(std::abs(bend) < kSelectionRules.edge_jump);
       }
     }
     if (!edge) continue;
@@ -186,16 +183,16 @@ touches::SumOfSquares PureErrorOf(const touches::Observations& o, const std::vec
 
 namespace {
 
-// How many repeats of one pose the search may see, so that all poses together stay within kMaxSearched; never fewer
-// than kMinRepeats. `usable`: touches per pose.
+// How many repeats of one pose the search may see, so that all poses together stay within kSelectionRules.max_searched; never fewer
+// than kSelectionRules.min_repeats. `usable`: touches per pose.
 int MaxRepeats(const std::vector<int>& usable) {
-  int repeats = kMinRepeats;
+  int repeats = kSelectionRules.min_repeats;
   const auto total = [&](int limit) {
     return std::accumulate(usable.begin(), usable.end(), int64_t{0},
                            [limit](int64_t sum, int count) { return sum + std::min(count, limit); });
   };
   const int most = usable.empty() ? 0 : *std::max_element(usable.begin(), usable.end());
-  while (repeats < most && total(repeats + 1) <= kMaxSearched) ++repeats;
+  while (repeats < most && total(repeats + 1) <= kSelectionRules.max_searched) ++repeats;
   return repeats;
 }
 
@@ -207,7 +204,7 @@ std::vector<char> ChooseTouches(const touches::Observations& o) {
   const int max_repeats = MaxRepeats(usable);
   int total = 0;
   for (const int count : usable) total += std::min(count, max_repeats);
-  const double stride = std::max(1.0, static_cast<double>(total) / kMaxSearched);
+  const double stride = std::max(1.0, static_cast<double>(total) / kSelectionRules.max_searched);
   std::vector<int> quota(o.poses, 0), seen(o.poses, 0);
   double credit = 0;
   for (int pose = 0; pose < o.poses; ++pose) {
@@ -262,7 +259,7 @@ touches::Contrasts WeighedContrasts(const Workspace& workspace, const touches::O
 
 absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weights_by_row) {
   const touches::Observations& o = *workspace->observations;
-  workspace->thinned = o.size() > kMaxSearched;
+  workspace->thinned = o.size() > kSelectionRules.max_searched;
   workspace->searched = std::make_unique<touches::Observations>(SearchedOf(o, workspace->thinned));
   workspace->searched_predictor = std::make_unique<touches::Predictor>(*workspace->searched, nullptr);
   TOUCHSTONE_ASSIGN_OR_RETURN(workspace->searched_nominal,
@@ -278,7 +275,7 @@ absl::Status PrepareSearch(Workspace* workspace, const std::vector<double>& weig
       touches::SurfaceErrorGeometry(searched, *workspace->contrasts, workspace->searched_nominal);
   workspace->likelihood = std::make_unique<engine::Likelihood>(
       touches::FirstRowsOfObjects(*workspace->contrasts, static_cast<int>(searched.objects.size())),
-      &geometry, kRoundingM * slope, workspace->context.pool);
+      &geometry, kSelectionRules.rounding * slope, workspace->context.pool);
   workspace->rows = std::make_unique<touches::TouchObservationModel>(
       searched, *workspace->searched_predictor, *workspace->contrasts, workspace->searched_nominal.time_s);
   engine::Experiment& experiment = workspace->experiment;

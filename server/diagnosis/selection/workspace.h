@@ -14,12 +14,6 @@
 
 namespace touchstone::diagnosis::selection {
 
-// The search works on at most so many touches: its likelihood costs the square of an object's touches.
-inline constexpr int kMaxSearched = 2400;
-
-// What mesh files and numbers of measurement files are rounded to, about.
-inline constexpr double kRoundingM = 0.3e-6;
-
 struct Workspace {
   DiagnosisInput input;
   DiagnosisContext context;

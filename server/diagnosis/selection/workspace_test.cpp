@@ -1,4 +1,5 @@
 #include "server/diagnosis/selection/workspace.h"
+#include "server/diagnosis/selection/rules.h"
 
 #include <gtest/gtest.h>
 
@@ -29,8 +30,8 @@ TEST(Workspace, ThinsALargeSetToWholePosesOfEveryObject) {
   const touches::Observations& searched = *(*workspace)->searched;
   EXPECT_TRUE((*workspace)->thinned);
   const int used = static_cast<int>(std::count(searched.used.begin(), searched.used.end(), 1));
-  EXPECT_LE(used, kMaxSearched);
-  EXPECT_GT(used, kMaxSearched / 2);
+  EXPECT_LE(used, kSelectionRules.max_searched);
+  EXPECT_GT(used, kSelectionRules.max_searched / 2);
   std::vector<int> of_object(searched.objects.size()), of_pose(searched.poses);
   for (int k = 0; k < searched.size(); ++k)
     if (searched.used[k]) ++of_object[searched.object[k]], ++of_pose[searched.pose[k]];
@@ -49,8 +50,8 @@ TEST(Workspace, SearchesManyRepeatsOfFewPosesOverTheWholeSession) {
   const touches::Observations& searched = *(*workspace)->searched;
   EXPECT_TRUE((*workspace)->thinned);
   const int used = static_cast<int>(std::count(searched.used.begin(), searched.used.end(), 1));
-  EXPECT_LE(used, kMaxSearched);
-  EXPECT_GT(used, 0.9 * kMaxSearched);
+  EXPECT_LE(used, kSelectionRules.max_searched);
+  EXPECT_GT(used, 0.9 * kSelectionRules.max_searched);
   // Of each object's stretch of the session every tenth part is seen alike.
   std::vector<int> of_part(10 * rig.objects.size());
   for (int k = 0; k < searched.size(); ++k) {

@@ -8,13 +8,11 @@
 #include <vector>
 
 #include "server/base/units.h"
+#include "server/diagnosis/selection/curves/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kWarmUpKnots = 16;
-constexpr int kKnotsPerCycle = 12;
 
 double WaveAt(const CandidateCourse& course, const SessionSlots& slots, double x) {
   return std::sin(2 * kPi * (x - slots.first()) / course.constant + course.phase);
@@ -91,13 +89,13 @@ NamelessCurve CurveOf(const CandidateCourse& course, const SessionSlots& slots,
     curve.knots.push_back(slots.At(place)), shares.push_back(rises ? 1 : 0);
   };
   if (course.kind == CourseKind::kWave) {
-    const double step = course.constant / kKnotsPerCycle;
+    const double step = course.constant / kCurveRules.knots_per_cycle;
     for (double x = slots.first(); x < slots.last() + step; x += step)
       curve.knots.push_back(x), shares.push_back(WaveAt(course, slots, x));
   } else if (course.kind == CourseKind::kWarmUp) {
-    for (int j = 0; j <= kWarmUpKnots; ++j) {
+    for (int j = 0; j <= kCurveRules.warm_up_knots; ++j) {
       // Even steps of what is left to rise, to three time constants; then one to the end.
-      const double x = -course.constant * std::log(1 - 0.95 * j / kWarmUpKnots);
+      const double x = -course.constant * std::log(1 - 0.95 * j / kCurveRules.warm_up_knots);
       if (x >= slots.last()) break;
       curve.knots.push_back(x), shares.push_back(1 - std::exp(-x / course.constant));
     }

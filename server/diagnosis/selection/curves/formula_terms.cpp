@@ -8,17 +8,13 @@
 
 #include "server/base/text/text.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/curves/rules.h"
 #include "server/diagnosis/selection/curves/term_factors.h"
 #include "server/diagnosis/selection/curves/term_scores.h"
 #include "server/effects/formula/formula.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-// The size of a term that rigs show: scale of the prior.
-constexpr double kTypicalTravelM = 0.2e-3;
-constexpr int kPeriods = 40;
-constexpr double kMinPeriodMm = 1.5, kMaxPeriodMm = 40;
 
 model::ParameterInfo Bounded(const std::string& name, Unit unit, double bound) {
   model::ParameterInfo parameter;
@@ -57,7 +53,7 @@ class TermTable {
     columns_.push_back(column);
     const double rms = std::sqrt(column.squaredNorm() / touches_.rows());
     const double speed_m_s = o_.set->speed_m_s[o_.row[0]];
-    scales_.push_back(rms > 0 ? kTypicalTravelM / speed_m_s / rms : 1.0);
+    scales_.push_back(rms > 0 ? kCurveRules.typical_travel.value() / speed_m_s / rms : 1.0);
   }
 
   TermScores Score(const TermScorer& scorer, int width) const {
@@ -109,7 +105,8 @@ std::vector<FormulaTerm> ScoreProducts(const TermScorer& scorer,
         term.expression = absl::StrCat("k * ", finger.expression, plain ? "" : " * ", factor.expression);
         terms.push_back(std::move(term));
         table.Add(column);
-        penalties.push_back(factor.penalty_nats + (plain || !factor.differs ? 0 : kProductNats));
+        penalties.push_back(factor.penalty_nats +
+                            (plain || !factor.differs ? 0 : kCurveRules.product.value()));
       }
     }
   const TermScores scores = table.Score(scorer, 1);
@@ -128,8 +125,10 @@ std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const touches::T
   const int fingers = touches.observations().fingers;
   TermTable table(touches, d);
   std::vector<FormulaTerm> terms;
-  for (int n = 0; n < kPeriods; ++n) {
-    const double period_mm = kMinPeriodMm * std::pow(kMaxPeriodMm / kMinPeriodMm, n / (kPeriods - 1.0));
+  for (int n = 0; n < kCurveRules.periods; ++n) {
+    const double period_mm =
+        kCurveRules.min_period *
+        std::pow(kCurveRules.max_period / kCurveRules.min_period, n / (kCurveRules.periods - 1.0));
     for (const double shift : {0.0, 0.25})
       table.Add(table.Column(false, [&](int k, int i) {
         const double travel_mm = d.travel_m[static_cast<size_t>(k) * fingers + i] * kMillimetresPerMetre;
@@ -143,9 +142,10 @@ std::vector<FormulaTerm> ScorePeriods(const TermScorer& scorer, const touches::T
     terms.push_back(std::move(term));
   }
   const TermScores scores = table.Score(scorer, 2);
-  for (int n = 0; n < kPeriods; ++n) {
+  for (int n = 0; n < kCurveRules.periods; ++n) {
     FormulaTerm& term = terms[n];
-    term.gain_nats = scores.log_evidence[n] - kCurvedNats - std::log(static_cast<double>(kPeriods));
+    term.gain_nats = scores.log_evidence[n] - kCurveRules.curved -
+                     std::log(static_cast<double>(kCurveRules.periods.value()));
     term.log_ratio = scores.log_ratio[n];
     const double k = std::hypot(scores.step(0, n), scores.step(1, n));
     term.values[0] = k;

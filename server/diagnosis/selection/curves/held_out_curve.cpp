@@ -5,18 +5,18 @@
 #include <vector>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/selection/curves/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kCurveFolds = 5, kStretches = 60;
-
 int FoldOf(const engine::Experiment& experiment, const touches::TouchObservationModel& touches, int row,
            bool of_time) {
-  if (!of_time) return experiment.observations->BlockOfRow(row) % kCurveFolds;
+  if (!of_time) return experiment.observations->BlockOfRow(row) % kCurveRules.folds;
   const int k = touches.contrasts().touches()[touches.contrasts().touch_of_row()[row]];
-  return static_cast<int>(static_cast<int64_t>(k) * kStretches / std::max(touches.observations().size(), 1)) %
-         kCurveFolds;
+  return static_cast<int>(static_cast<int64_t>(k) * kCurveRules.fold_stretches /
+                          std::max(touches.observations().size(), 1)) %
+         kCurveRules.folds;
 }
 
 }  // namespace
@@ -35,7 +35,7 @@ double HeldOutBeside(const engine::Experiment& experiment, const touches::TouchO
   const Eigen::MatrixXd whole = x.transpose() * x + penalty;
   const Eigen::VectorXd whole_r = x.transpose() * r;
   double squares = 0;
-  for (int fold = 0; fold < kCurveFolds; ++fold) {
+  for (int fold = 0; fold < kCurveRules.folds; ++fold) {
     std::vector<int> out;
     for (int row = 0; row < n; ++row)
       if (FoldOf(experiment, touches, row, of_time) == fold) out.push_back(row);

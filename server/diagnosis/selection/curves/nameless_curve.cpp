@@ -10,18 +10,11 @@
 #include "server/base/units.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/held_out_curve.h"
+#include "server/diagnosis/selection/curves/rules.h"
 #include "server/diagnosis/selection/curves/time_course.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kKnots = 40, kKnotsPerFinger = 20;  // of time 40 in either case
-constexpr double kTypicalCurveM = 0.3e-3;         // size that rigs show: scale of the prior
-constexpr int kBends = 8;                         // each a third of the last
-constexpr double kMinGainNats = 10;               // calibrated on sets without a hidden effect
-constexpr double kMinHeldOutGain = 0.003;
-constexpr double kWorthAllNats = 2;
-constexpr double kNegligibleNats = 30;  // hypotheses of the surface this far behind take no part
 
 // Knots half by rank and half by value: dense where data are, and nowhere far apart.
 std::vector<double> PlaceKnots(std::vector<double> values, int count) {
@@ -73,7 +66,7 @@ class CurveScorer {
     double sum = 0;
     for (int s = 0; s < static_cast<int>(base.size()); ++s) {
       sum += std::exp(base[s] - *best);
-      if (s == 0 || base[s] > *best - kNegligibleNats) hypotheses_.push_back(s);
+      if (s == 0 || base[s] > *best - kCurveRules.negligible_surface) hypotheses_.push_back(s);
     }
     base_log_ = *best + std::log(sum);
     few_hypotheses_ = {0};
@@ -87,8 +80,9 @@ class CurveScorer {
       for (int i = 0; i < o_.fingers; ++i)
         if (const double value = covariate.value(k, i); std::isfinite(value)) values.push_back(value);
     if (values.empty()) return false;
-    curve->knots =
-        PlaceKnots(std::move(values), covariate.of_time || !curve->per_finger ? kKnots : kKnotsPerFinger);
+    curve->knots = PlaceKnots(std::move(values), covariate.of_time || !curve->per_finger
+                                                     ? kCurveRules.knots.value()
+                                                     : kCurveRules.knots_per_finger.value());
     const int knots = static_cast<int>(curve->knots.size()), lists = curve->per_finger ? o_.fingers : 1;
     if (knots < 2 || 3 * knots * lists > touches_.rows()) return false;
     basis_.resize(touches_.rows(), knots * lists);
@@ -111,7 +105,7 @@ class CurveScorer {
   // nothing.
   void Fit(NamelessCurve* curve) {
     FitUnder(few_hypotheses_, curve);
-    if (curve->gain_nats > kWorthAllNats) FitUnder(hypotheses_, curve);
+    if (curve->gain_nats > kCurveRules.worth_all) FitUnder(hypotheses_, curve);
   }
 
   // The errors on what is left out, without a surface: what holds elsewhere must not need one.
@@ -137,10 +131,10 @@ class CurveScorer {
     std::vector<double> evidences;
     for (const int s : hypotheses) {
       const Eigen::MatrixXd gram = likelihood_.Gram(all, s);
-      for (int bend = 0; bend < (knots > 2 ? kBends : 1); ++bend) {
+      for (int bend = 0; bend < (knots > 2 ? kCurveRules.bends.value() : 1); ++bend) {
         const Eigen::MatrixXd precision = Precision(knots, lists, size, bend);
         const Part part = Evidence(gram, s, precision);
-        const double evidence = part.log_evidence - std::log(knots > 2 ? kBends : 1.0);
+        const double evidence = part.log_evidence - std::log(knots > 2 ? kCurveRules.bends.value() : 1.0);
         evidences.push_back(evidence);
         if (evidence <= best) continue;
         best = evidence;
@@ -173,8 +167,8 @@ class CurveScorer {
 
   double TypicalSize(bool adds_time) const {
     const double speed_m_s = o_.set->speed_m_s[o_.row[0]];
-    return adds_time ? kTypicalCurveM / speed_m_s * kMicrosecondsPerSecond
-                     : kTypicalCurveM * kMillimetresPerMetre;
+    return adds_time ? kCurveRules.typical_curve.value() / speed_m_s * kMicrosecondsPerSecond
+                     : kCurveRules.typical_curve.value() * kMillimetresPerMetre;
   }
 
   // Of the values, over the variance of the noise.
@@ -258,7 +252,7 @@ std::vector<NamelessCurve> ScoreCurves(const engine::Experiment& experiment,
         curve.adds_time = adds_time;
         if (!scorer.MakeBasis(covariate, &curve)) continue;
         scorer.Fit(&curve);
-        if (only.empty() ? curve.gain_nats > kMinGainNats / 2 : true) scorer.HoldOut(&curve);
+        if (only.empty() ? curve.gain_nats > kCurveRules.min_gain / 2 : true) scorer.HoldOut(&curve);
         competing.push_back(curve.gain_nats);
         if (best.covariate.empty() || curve.gain_nats > best.gain_nats) best = std::move(curve);
       }
@@ -284,8 +278,8 @@ std::vector<NamelessCurve> ScoreCurves(const engine::Experiment& experiment,
 }
 
 bool IsSignificant(const NamelessCurve& curve) {
-  return curve.gain_nats > kMinGainNats && curve.heldout_with_s > 0 &&
-         curve.heldout_with_s < (1 - kMinHeldOutGain) * curve.heldout_without_s;
+  return curve.gain_nats > kCurveRules.min_gain && curve.heldout_with_s > 0 &&
+         curve.heldout_with_s < (1 - kCurveRules.min_held_out_gain) * curve.heldout_without_s;
 }
 
 }  // namespace touchstone::diagnosis::selection

@@ -4,11 +4,10 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kNearShare = 0.5;  // of the curve's gain, for a formula that comes near it
 
 // Whether what explains the rest in the fit is a curve and no formula.
 bool HasCurveAsEffect(const SelectionResult& result) {
@@ -33,7 +32,8 @@ const FormulaTerm* NearestTerm(const std::vector<FormulaTerm>& terms, const Name
   for (const FormulaTerm& term : terms)
     if (term.covariate == curve.covariate && (nearest == nullptr || term.gain_nats > nearest->gain_nats))
       nearest = &term;
-  if (nearest == nullptr || !(curve.gain_nats > 0) || nearest->gain_nats < kNearShare * curve.gain_nats)
+  if (nearest == nullptr || !(curve.gain_nats > 0) ||
+      nearest->gain_nats < kCurveRules.near_share * curve.gain_nats)
     return nullptr;
   return nearest;
 }

@@ -7,6 +7,7 @@
 
 #include "server/base/text/text.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/curves/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -35,8 +36,8 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
     factors.push_back({covariate, expression, differs, penalty_nats, std::move(value)});
   };
   const auto with_square = [&](const std::string& name, bool differs, const TermValue& value) {
-    add(name, name, differs, kSimpleNats, value);
-    add(name, name + "^2", differs, kCurvedNats, [value](int k, int i) {
+    add(name, name, differs, kCurveRules.simple, value);
+    add(name, name + "^2", differs, kCurveRules.curved, [value](int k, int i) {
       const double x = value(k, i);
       return x * x;
     });
@@ -60,22 +61,22 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
     if (!std::isnan(travel)) mean_mm += travel * kMillimetresPerMetre, ++counted;
   mean_mm = std::round(mean_mm / std::max(counted, 1));
   const TermValue travel_mm = [&d, at](int k, int i) { return d.travel_m[at(k, i)] * kMillimetresPerMetre; };
-  add("travel_mm", "travel_mm", true, kSimpleNats, travel_mm);
-  add("travel_mm", absl::StrCat("(travel_mm - ", ShortestNumber(mean_mm), ")^2"), true, kCurvedNats,
+  add("travel_mm", "travel_mm", true, kCurveRules.simple, travel_mm);
+  add("travel_mm", absl::StrCat("(travel_mm - ", ShortestNumber(mean_mm), ")^2"), true, kCurveRules.curved,
       [travel_mm, mean_mm](int k, int i) { return std::pow(travel_mm(k, i) - mean_mm, 2); });
-  add("travel_mm", absl::StrCat("abs(travel_mm - ", ShortestNumber(mean_mm), ")"), true, kCurvedNats,
+  add("travel_mm", absl::StrCat("abs(travel_mm - ", ShortestNumber(mean_mm), ")"), true, kCurveRules.curved,
       [travel_mm, mean_mm](int k, int i) { return std::abs(travel_mm(k, i) - mean_mm); });
 
   const TermValue cosine = [&d, at](int k, int i) { return std::clamp(d.cos_incidence[at(k, i)], 0.1, 1.0); };
   const TermValue tangent = [&d, at](int k, int i) { return TangentOfIncidence(d, at(k, i)); };
-  add("incidence_deg", kTangent, true, kSimpleNats, tangent);
-  add("incidence_deg", absl::StrCat(kTangent, "^2"), true, kSimpleNats,
+  add("incidence_deg", kTangent, true, kCurveRules.simple, tangent);
+  add("incidence_deg", absl::StrCat(kTangent, "^2"), true, kCurveRules.simple,
       [tangent](int k, int i) { return std::pow(tangent(k, i), 2); });
-  add("incidence_deg", "(1/cos(incidence_deg*pi/180) - 1)", true, kCurvedNats,
+  add("incidence_deg", "(1/cos(incidence_deg*pi/180) - 1)", true, kCurveRules.curved,
       [cosine](int k, int i) { return 1 / cosine(k, i) - 1; });
-  add("incidence_deg", "incidence_deg", true, kSimpleNats,
+  add("incidence_deg", "incidence_deg", true, kCurveRules.simple,
       [cosine](int k, int i) { return std::acos(cosine(k, i)) * 180 / kPi; });
-  add("incidence_deg", "sin(incidence_deg*pi/180)", true, kSimpleNats,
+  add("incidence_deg", "sin(incidence_deg*pi/180)", true, kCurveRules.simple,
       [cosine](int k, int i) { return std::sqrt(1 - std::pow(cosine(k, i), 2)); });
   if (!d.curvature_per_m.empty())
     with_square("curvature_per_m", true, [&d, at](int k, int i) { return d.curvature_per_m[at(k, i)]; });
@@ -89,7 +90,7 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
     }
     const double mean = ThreeDigits(sum / std::max(o.size(), 1));
     if (!(max > min) || mean == 0) return;
-    add("pause_s", absl::StrCat("(pause_s - ", ShortestNumber(mean), ")"), false, kSimpleNats,
+    add("pause_s", absl::StrCat("(pause_s - ", ShortestNumber(mean), ")"), false, kCurveRules.simple,
         [&o, mean](int k, int) { return touches::PauseS(o, k) - mean; });
   };
 
@@ -97,8 +98,8 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
   const double middle = 0.5 * (o.fingers - 1);
   for (int finger = 0; finger < o.fingers; ++finger)
     add("first_finger", absl::StrCat("(first_finger == ", ShortestNumber(finger - middle), ")"), false,
-        kSimpleNats, [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
-  add("first_finger", "first_finger", false, kSimpleNats,
+        kCurveRules.simple, [&d, finger](int k, int) { return d.first_finger[k] == finger ? 1.0 : 0.0; });
+  add("first_finger", "first_finger", false, kCurveRules.simple,
       [&d, middle](int k, int) { return d.first_finger[k] - middle; });
   if (set.has_session_time) add_pause();
   with_square("previous_press_mm", true,
@@ -110,7 +111,7 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
   if (varies(set.speed_m_s)) {
     const TermValue speed_mm_s = [&](int k, int) { return set.speed_m_s[o.row[k]] * kMillimetresPerMetre; };
     with_square("speed_mm_s", false, speed_mm_s);
-    add("speed_mm_s", "1/speed_mm_s", false, kSimpleNats,
+    add("speed_mm_s", "1/speed_mm_s", false, kCurveRules.simple,
         [speed_mm_s](int k, int i) { return 1 / speed_mm_s(k, i); });
   }
   // Conditions stand far from zero, and their effect was put to zero somewhere in the middle.
@@ -124,10 +125,10 @@ std::vector<TermFactor> ListTermFactors(const touches::Observations& o, const to
     const std::vector<double>* values = &column;
     const TermValue plain = [&o, values](int k, int) { return (*values)[o.row[k]]; };
     const TermValue shifted = [plain, mean](int k, int i) { return plain(k, i) - mean; };
-    add(name, name, false, kSimpleNats, plain);
+    add(name, name, false, kCurveRules.simple, plain);
     if (mean == 0) return;
-    add(name, text, false, kSimpleNats, shifted);
-    add(name, text + "^2", false, kCurvedNats,
+    add(name, text, false, kCurveRules.simple, shifted);
+    add(name, text + "^2", false, kCurveRules.curved,
         [shifted](int k, int i) { return shifted(k, i) * shifted(k, i); });
   };
   if (set.has_session_time) centred("session_time_s", set.session_time_s);

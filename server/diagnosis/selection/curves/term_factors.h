@@ -27,9 +27,6 @@ struct FingerFactor {
   TermValue value;
 };
 
-// Complexity penalties of a curved function, and of a product of two things that differ.
-inline constexpr double kSimpleNats = 0, kCurvedNats = 1.5, kProductNats = 2;
-
 // Both must outlive the lists.
 std::vector<TermFactor> ListTermFactors(const touches::Observations& observations,
                                         const touches::Prediction& details);

@@ -10,21 +10,11 @@
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/selection/curves/candidate_course.h"
 #include "server/diagnosis/selection/curves/held_out_curve.h"
+#include "server/diagnosis/selection/curves/rules.h"
 #include "server/diagnosis/selection/curves/session_slots.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kEvenSlots = 48;  // of the session, with as many touches each: where courses may begin and end
-constexpr int kMinTouchesPerSlot = 3;
-constexpr int kFineSlots = 12;  // in place of each slot round the best step's beginning
-constexpr int kWarmUps = 8;     // time constants, from the first to the second share of the session
-constexpr double kShortestWarmUp = 0.015, kLongestWarmUp = 0.5;
-constexpr int kMaxCycles = 16, kFrequenciesPerCycle = 2,
-              kPhases = 6;              // of waves; more cycles: a smooth curve's
-constexpr int kFinerWaves = 4;          // between two frequencies or phases
-constexpr double kVisibleShare = 1e-6;  // of a column's square that the fit's own columns leave
-constexpr double kWorthRefiningNats = 3;
 
 class CourseScorer {
  public:
@@ -38,7 +28,7 @@ class CourseScorer {
         slots_(experiment, touches, fit, details, covariate) {}
 
   bool IsPossible() const {
-    return fingers_ >= 2 && slots_.touches() >= kEvenSlots * kMinTouchesPerSlot &&
+    return fingers_ >= 2 && slots_.touches() >= kCurveRules.even_slots * kCurveRules.min_touches_per_slot &&
            slots_.last() > slots_.first();
   }
 
@@ -46,8 +36,9 @@ class CourseScorer {
 
   void DivideEvenly() {
     std::vector<int> begins;
-    for (int slot = 0; slot < kEvenSlots; ++slot)
-      begins.push_back(static_cast<int>(static_cast<int64_t>(slots_.touches()) * slot / kEvenSlots));
+    for (int slot = 0; slot < kCurveRules.even_slots; ++slot)
+      begins.push_back(
+          static_cast<int>(static_cast<int64_t>(slots_.touches()) * slot / kCurveRules.even_slots));
     slots_.Divide(std::move(begins));
   }
 
@@ -57,7 +48,8 @@ class CourseScorer {
     for (const int edge : {course.begin, course.end}) {
       if (edge <= 0 || edge >= slots_.slots()) continue;
       const int from = slots_.Begin(edge - 1), to = slots_.Begin(edge + 1);
-      for (int j = 0; j <= 2 * kFineSlots; ++j) begins.push_back(from + (to - from) * j / (2 * kFineSlots));
+      for (int j = 0; j <= 2 * kCurveRules.fine_slots; ++j)
+        begins.push_back(from + (to - from) * j / (2 * kCurveRules.fine_slots));
     }
     std::sort(begins.begin(), begins.end());
     begins.erase(std::unique(begins.begin(), begins.end()), begins.end());
@@ -86,9 +78,10 @@ class CourseScorer {
     course.kind = kind;
     if (kind == CourseKind::kWarmUp) {
       const double range = slots_.last() - slots_.first();
-      for (int j = 0; j < kWarmUps; ++j) {
-        course.constant =
-            range * kShortestWarmUp * std::pow(kLongestWarmUp / kShortestWarmUp, j / (kWarmUps - 1.0));
+      for (int j = 0; j < kCurveRules.warm_ups; ++j) {
+        course.constant = range * kCurveRules.shortest_warm_up *
+                          std::pow(kCurveRules.longest_warm_up / kCurveRules.shortest_warm_up,
+                                   j / (kCurveRules.warm_ups - 1.0));
         OfWeights(WeightsOf(course), &products);
         take(course, products);
       }
@@ -121,16 +114,17 @@ class CourseScorer {
       waves.back().constant = range / cycles, waves.back().phase = phase;
     };
     if (near == nullptr) {
-      for (int j = kFrequenciesPerCycle; j <= kMaxCycles * kFrequenciesPerCycle; ++j)
-        for (int phase = 0; phase < kPhases; ++phase)
-          add(static_cast<double>(j) / kFrequenciesPerCycle, kPi * phase / kPhases);
+      for (int j = kCurveRules.frequencies_per_cycle;
+           j <= kCurveRules.max_cycles * kCurveRules.frequencies_per_cycle; ++j)
+        for (int phase = 0; phase < kCurveRules.phases; ++phase)
+          add(static_cast<double>(j) / kCurveRules.frequencies_per_cycle, kPi * phase / kCurveRules.phases);
       return waves;
     }
     const double cycles = range / near->constant;
-    for (int j = -kFinerWaves; j <= kFinerWaves; ++j)
-      for (int phase = -2 * kFinerWaves; phase <= 2 * kFinerWaves; ++phase)
-        add(cycles + static_cast<double>(j) / (kFinerWaves * kFrequenciesPerCycle),
-            near->phase + kPi * phase / (kFinerWaves * kPhases));
+    for (int j = -kCurveRules.finer_waves; j <= kCurveRules.finer_waves; ++j)
+      for (int phase = -2 * kCurveRules.finer_waves; phase <= 2 * kCurveRules.finer_waves; ++phase)
+        add(cycles + static_cast<double>(j) / (kCurveRules.finer_waves * kCurveRules.frequencies_per_cycle),
+            near->phase + kPi * phase / (kCurveRules.finer_waves * kCurveRules.phases));
     return waves;
   }
 
@@ -138,7 +132,8 @@ class CourseScorer {
   double Places(CourseKind kind) const {
     const double n = static_cast<double>(slots_.touches());
     if (kind == CourseKind::kWave)
-      return static_cast<double>(kMaxCycles * kFrequenciesPerCycle * kPhases * kFinerWaves * kFinerWaves);
+      return static_cast<double>(kCurveRules.max_cycles * kCurveRules.frequencies_per_cycle *
+                                 kCurveRules.phases * kCurveRules.finer_waves * kCurveRules.finer_waves);
     return kind == CourseKind::kStep ? n : 0.5 * n * n;
   }
 
@@ -210,11 +205,11 @@ class CourseScorer {
       if (course->finger >= 0) {
         const Eigen::VectorXd v = Direction(course->finger);
         const double square = v.dot(of.a * v), product = v.dot(of.b);
-        if (square > kVisibleShare * of.plain) {
+        if (square > kCurveRules.visible * of.plain) {
           drop = product * product / square;
           values[course->finger] = product / square;
         }
-      } else if (of.a.trace() > kVisibleShare * of.plain) {
+      } else if (of.a.trace() > kCurveRules.visible * of.plain) {
         Eigen::MatrixXd ridged = of.a;
         ridged.diagonal().array() += 1e-9 * of.a.trace();
         const Eigen::VectorXd solved = SymmetricSolver(ridged).Solve(of.b);
@@ -253,7 +248,7 @@ TimeCourses ScoreTimeCourses(const engine::Experiment& experiment,
     CandidateCourse best;
     double gain_nats = scorer.Score(kind, 0, &best);
     if (!std::isfinite(gain_nats) || best.values.size() == 0) continue;
-    const bool finer = kind != CourseKind::kWarmUp && gain_nats > kWorthRefiningNats;
+    const bool finer = kind != CourseKind::kWarmUp && gain_nats > kCurveRules.worth_refining;
     if (finer) {
       CandidateCourse refined = best;
       refined.log_evidence = -INFINITY;

@@ -7,16 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/session/session_order.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kManyEffects = 3;      // more at once need a reason
-constexpr double kNearTypical = 5;   // sizes over the typical one that are near it
-constexpr double kMaxUnusual = 0.9;  // ... of one that would be larger than rigs show
-// Probability of either of two effects that two speeds cannot tell from another.
-constexpr double kMaxAtTwoSpeeds = 0.5;
 
 // The largest value of the effect over the size that rigs show.
 double SizeOverTypical(const engine::Fit& fit, int index) {
@@ -57,7 +52,7 @@ void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::Select
       const std::string words = UnusualValue(effect, step);
       if (words.empty()) continue;
       engine::AddWords(words, &step);
-      step.probability = std::min(step.probability, kMaxUnusual);
+      step.probability = std::min(step.probability, kLadderRules.max_unusual.value());
     }
   }
 }
@@ -68,7 +63,7 @@ std::string StrangeValuesInWords(const engine::Fit& fit, const std::vector<engin
   std::vector<std::string> stopped;
   for (const engine::SelectedStep& selected : steps) {
     ++effects;
-    near_typical += SizeOverTypical(fit, selected.effect) <= kNearTypical;
+    near_typical += SizeOverTypical(fit, selected.effect) <= kLadderRules.near_typical;
     if (!engine::IsAtBound(fit, selected.effect)) continue;
     const std::string name = engine::NameOf(*fit.model.base().effects[selected.effect].effect);
     stopped.push_back(name);
@@ -79,7 +74,7 @@ std::string StrangeValuesInWords(const engine::Fit& fit, const std::vector<engin
   if (!stopped.empty())
     return absl::StrCat("The data ask for more of ", absl::StrJoin(stopped, ", "),
                         " than the catalogue allows: a value at its bound explains nothing.");
-  if (effects > kManyEffects && near_typical == 0)
+  if (effects > kLadderRules.many_effects && near_typical == 0)
     return absl::StrCat("It would take ", effects,
                         " effects at once, none near the size that rigs show: something else is wrong.");
   return "";
@@ -101,7 +96,7 @@ void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
       engine::AddWords(absl::StrCat("At two speeds, whatever depends on the speed is some sum of ", names[0],
                                     " and ", names[1], ": measure at a third one."),
                        &step);
-      step.probability = std::min(step.probability, kMaxAtTwoSpeeds);
+      step.probability = std::min(step.probability, kLadderRules.max_beside_other.value());
     }
   }
 }

@@ -19,6 +19,7 @@
 #include "server/diagnosis/selection/ladder/hypotheses.h"
 #include "server/diagnosis/selection/ladder/model_posterior.h"
 #include "server/diagnosis/selection/ladder/noise_questions.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/ladder/surface_step.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/scatter/touches_set_aside.h"
@@ -32,12 +33,6 @@
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kSurfaceNats = 5;        // evidence that asks for a surface error by itself
-constexpr double kSurfaceWithMisfit = 1;  // ... and where the lack of fit says that something is left
-constexpr double kMisfitP = 1e-2;
-constexpr double kSameSurface =
-    2.5;  // ratio of two sizes of bumps that may be the same: an object has few of them
 
 // The error as a comparison finds it; the held-out error keeps its ratio to the fit's.
 absl::Status SetErrors(const Workspace& workspace, const engine::Fit& fit,
@@ -219,13 +214,14 @@ class LadderBuilder {
   absl::Status AskSurface() {
     if (selection_.fit.hypothesis == 0) return absl::OkStatus();
     const double gain_nats = selection_.surface_error.gain_nats;
-    const bool misfit = left_.lack_of_fit_p < kMisfitP;
-    if (!(gain_nats > kSurfaceNats || (misfit && gain_nats > kSurfaceWithMisfit))) return absl::OkStatus();
+    const bool misfit = left_.lack_of_fit_p < kLadderRules.misfit_p;
+    if (!(gain_nats > kLadderRules.surface || (misfit && gain_nats > kLadderRules.surface_with_misfit)))
+      return absl::OkStatus();
     TOUCHSTONE_ASSIGN_OR_RETURN(const SurfaceSupport support, FindSurfaceSupport(workspace_, selection_.fit));
     const model::EffectInstance* given = GivenSurface();
     const double rms_m = selection_.surface_error.rms_m;
     // The model may say that surfaces are as wrong as this.
-    const bool as_given = given != nullptr && rms_m < kSameSurface * given->values[0];
+    const bool as_given = given != nullptr && rms_m < kLadderRules.same_surface * given->values[0];
     if (as_given || support.IsSurface()) {
       left_.lack_of_fit_p = QualityWithoutSurface(workspace_, selection_.fit).lack_of_fit_p;
       ladder_.surface_as_given = as_given;
@@ -235,7 +231,8 @@ class LadderBuilder {
       RefitSurfaceError(selection_.surface_error, &ladder_);
       return absl::OkStatus();
     }
-    if (gain_nats > kSurfaceNats && support.IsElsewhere()) found_.Add(H::kUnplaced, support.WordsOfRest());
+    if (gain_nats > kLadderRules.surface && support.IsElsewhere())
+      found_.Add(H::kUnplaced, support.WordsOfRest());
     return absl::OkStatus();
   }
 

@@ -5,12 +5,11 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/diagnosis/engine/fit/support_points.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMaxMeasuredPlaces = 400;  // of one object
 
 // Where each effect of a fit's model stands in the improved one, which has lost some and gained others at its
 // end; -1: it has lost it.
@@ -128,7 +127,7 @@ std::map<std::string, uncertainty::MeasuredPlaces> MeasuredPlacesOf(const touche
   std::map<std::string, uncertainty::MeasuredPlaces> places;
   for (size_t object = 0; object < all.size(); ++object) {
     uncertainty::MeasuredPlaces& kept = places[o.objects[object]];
-    kept.contact_m = engine::SupportPoints(all[object].contact_m, kMaxMeasuredPlaces);
+    kept.contact_m = engine::SupportPoints(all[object].contact_m, kLadderRules.max_measured_places);
     for (const Eigen::Vector3d& contact_m : kept.contact_m) {
       const auto found = std::find(all[object].contact_m.begin(), all[object].contact_m.end(), contact_m);
       kept.normal.push_back(all[object].normal[static_cast<size_t>(found - all[object].contact_m.begin())]);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/base/text/readable_time.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/scatter/lopsided_scatter.h"
 #include "server/diagnosis/selection/scatter/uneven_scatter.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
@@ -17,13 +18,8 @@
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kRoundsPossibleP =
-    0.05;  // of agreement within rounds, for a doubt of what scatter looks like
-// Probability of noise where an object that moves, or a random delay, would look alike.
-constexpr double kMaxBesideOther = 0.5;
-
 void DoubtStep(const std::string& words, engine::LadderStep* step) {
-  step->probability = std::min(step->probability, kMaxBesideOther);
+  step->probability = std::min(step->probability, kLadderRules.max_beside_other.value());
   engine::AddWords(words, step);
 }
 
@@ -115,7 +111,7 @@ void NoiseQuestions::DoubtSteps(size_t first, double rounds_p) {
   const std::string tails = effects::FindByRole(model::EffectRole::kNoiseTails)->name;
   for (size_t j = first; j < ladder_->steps.size(); ++j) {
     engine::LadderStep* step = &ladder_->steps[j];
-    if (rounds_p < kRoundsPossibleP)
+    if (rounds_p < kLadderRules.rounds_possible_p)
       DoubtStep("Repeats agree within rounds: an object put down anew each round would look alike.", step);
     if (pose_scatter_ && step->effect != level) DoubtStep(pose_scatter_->words, step);
     if (delay_ && step->effect == tails) DoubtStep(delay_->words, step);

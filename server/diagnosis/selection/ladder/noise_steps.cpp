@@ -6,19 +6,13 @@
 #include "server/base/numbers/normal.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/scatter/declared_noise.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kSignificant = 3.3;   // standard errors, for a refit
-constexpr double kRelevant = 0.02;     // relative change, for a refit
-constexpr double kMinSigmaS = 1.5e-6;  // less is the rounding of the file
-constexpr double kMinFloorUs = 2;      // of noise as a step: less is the rounding of the file
-constexpr double kSigmaFactor = 2;     // of sigma over what the model says, beyond which its value is wrong
-constexpr double kCertainNats = 1e3;   // noise is there or not: any scatter beyond rounding proves it
 
 class NoiseStepWriter {
  public:
@@ -100,7 +94,7 @@ class NoiseStepWriter {
     for (size_t p = 0; p < estimates.size(); ++p) {
       const double before = FromSi(parameters[std::min(p, parameters.size() - 1)].unit, present->values[p]);
       estimates[p].before = before;
-      other |= std::abs(estimates[p].value - before) > kSignificant * estimates[p].std_error;
+      other |= std::abs(estimates[p].value - before) > kLadderRules.significant * estimates[p].std_error;
     }
     if (!other) return;
     for (size_t p = 0; p < estimates.size(); ++p)
@@ -133,7 +127,9 @@ class NoiseStepWriter {
   void Refit(engine::ParameterEstimate estimate, model::EffectInstance* present) {
     const Unit unit = present->effect->parameters[0].unit;
     const double before = FromSi(unit, present->values[0]), change = std::abs(estimate.value - before);
-    if (change < kSignificant * estimate.std_error || change < kRelevant * estimate.value) return;
+    if (change < kLadderRules.significant * estimate.std_error ||
+        change < kLadderRules.relevant * estimate.value)
+      return;
     estimate.before = before;
     present->values[0] = RoundedValue(present->effect->parameters[0], estimate);
     present->object_values.clear();
@@ -179,7 +175,7 @@ namespace {
 touches::NoiseEstimate SigmaOf(const touches::NoiseFindings& noise, const engine::NoiseFloor& floor,
                                bool in_time) {
   touches::NoiseEstimate sigma = noise.sigma_s;
-  sigma.gain_nats = kCertainNats;
+  sigma.gain_nats = kLadderRules.certain;
   const bool plain = noise.slope.gain_nats == 0 && noise.degrees_of_freedom.gain_nats == 0 &&
                      noise.poll_interval_s.gain_nats == 0 && noise.length_sigma_m.gain_nats == 0 &&
                      noise.channel_sigma_s.empty();
@@ -207,7 +203,7 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
       [](const model::EffectInstance& e) { return e.effect->role == model::EffectRole::kNoiseLevel; });
   const touches::NoiseEstimate sigma = SigmaOf(noise, ladder->noise_floor, in_time);
   // Where ticks explain the scatter there is no further noise to be seen.
-  const bool scatter = sigma.value > kMinSigmaS;
+  const bool scatter = sigma.value > kLadderRules.min_sigma;
   // The level that a model has beside kinds of noise that are not assessed here says nothing by itself.
   const touches::DeclaredNoise declared = DeclaredNoiseOf(given);
   const bool level_alone = !declared.slope && !declared.degrees_of_freedom && !declared.length_sigma_m &&
@@ -216,7 +212,7 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   if (assessed && sigma.absent)
     writer.Remove(model::EffectRole::kNoiseLevel);
   else if (assessed && scatter &&
-           (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kMinFloorUs))
+           (has_sigma || ladder->noise_floor.sigma * kMicrosecondsPerSecond > kLadderRules.min_floor))
     writer.Write(model::EffectRole::kNoiseLevel, sigma);
   writer.WriteOrRemove(model::EffectRole::kNoiseGrowth, noise.slope);
   writer.WriteOrRemove(model::EffectRole::kNoiseTails, noise.degrees_of_freedom);
@@ -227,7 +223,8 @@ void AddNoiseSteps(touches::NoiseFindings noise, bool correlated, Ladder* ladder
   if (!noise.channel_sigma_s.empty()) writer.WriteByFinger(noise.channel_sigma_s);
   // Sigma is estimated anew by every diagnosis; a declared one that is off by a factor is a wrong value.
   const double declared_s = DeclaredSigma(given);
-  if (declared_s > 0 && scatter && std::abs(std::log(sigma.value / declared_s)) > std::log(kSigmaFactor))
+  if (declared_s > 0 && scatter &&
+      std::abs(std::log(sigma.value / declared_s)) > std::log(kLadderRules.sigma_factor.value()))
     ladder->values_wrong = true;
 }
 

@@ -6,20 +6,19 @@
 #include "server/base/numbers/normal.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/surface/surface_map_fit.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kLengthError = 0.4;  // relative, of a surface error's length: the grid's spacing
-
 // Size and length, in the units of files. What the bounds of the effect cut off is cut off here too.
 std::vector<engine::ParameterEstimate> DescribeSurface(const model::Effect& effect,
                                                        const SurfaceErrorFinding& found) {
   const std::pair<double, double> values[] = {
       {found.rms_m * kMillimetresPerMetre, 1 / std::sqrt(2 * std::max(found.effective_dof, 1.0))},
-      {found.length_m * kMillimetresPerMetre, kLengthError}};
+      {found.length_m * kMillimetresPerMetre, kLadderRules.length_error}};
   std::vector<engine::ParameterEstimate> estimates;
   for (const auto& [value, relative_error] : values) {
     const model::ParameterInfo& parameter = effect.parameters[estimates.size()];

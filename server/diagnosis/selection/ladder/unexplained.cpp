@@ -11,13 +11,10 @@
 #include "server/diagnosis/selection/curve_competition.h"
 #include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
+#include "server/diagnosis/selection/ladder/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr size_t kMaxCovariates = 6;
-constexpr double kCovariateP = 0.01;
-constexpr int kMaxSpan = 8;  // columns: effects with more of them look like anything
 
 // Cosine between a column and the nearest point of the span of others, all without `own`.
 double Cosine(const Eigen::MatrixXd& own, const Eigen::VectorXd& column, const Eigen::MatrixXd& span) {
@@ -66,7 +63,7 @@ std::vector<engine::CovariateTest> TestCovariates(const std::vector<FormulaTerm>
                         [&](const engine::CovariateTest& test) { return test.name == first; });
   std::vector<engine::CovariateTest> kept;
   for (const engine::CovariateTest& test : sorted)
-    if (kept.size() < kMaxCovariates && test.p < kCovariateP) kept.push_back(test);
+    if (kept.size() < kLadderRules.max_covariates && test.p < kLadderRules.covariate_p) kept.push_back(test);
   return kept;
 }
 
@@ -121,7 +118,7 @@ void AddCurves(const SelectionResult& selection, std::vector<engine::CovariateTe
     std::stable_partition(tests->begin(), tests->end(),
                           [&](const engine::CovariateTest& test) { return test.name == first; });
   }
-  if (tests->size() > kMaxCovariates) tests->resize(kMaxCovariates);
+  if (tests->size() > kLadderRules.max_covariates) tests->resize(kLadderRules.max_covariates);
 }
 
 // The term of the curve's covariate that gains most, if it is worth a look, and how much of the curve's gain that is.
@@ -163,7 +160,7 @@ absl::Status FindNearestEffect(const Workspace& workspace, const SelectionResult
     if (extension.candidate < 0 || !extension.Acts() || !extension.object.empty()) continue;
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd span,
                                 engine::ResponseColumns(workspace.experiment, extension, without));
-    if (span.cols() > kMaxSpan) continue;
+    if (span.cols() > kLadderRules.max_span) continue;
     const double cosine = Cosine(others, column, span);
     if (cosine <= rest->nearest_cosine) continue;
     rest->nearest_cosine = cosine;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnosis/selection/scatter/rules.h"
 #include "server/diagnosis/touches/noise/golden_section.h"
 
 namespace touchstone::diagnosis::selection {
@@ -12,10 +13,6 @@ namespace {
 
 using touches::NoiseModel;
 using touches::ReadingGroup;
-
-constexpr int kFirstSteps = 5, kDelaySteps = 60;  // of the expectation-maximisation
-constexpr double kFirstNats = 2;                  // after the first steps, for the others to be taken
-constexpr int kSections = 12;                     // golden, of the share of a delay
 
 // Two values. A touch of n fingers has 2^n ways to be late; given one, its readings are normal about their common shift, so that
 // density and maximisation are closed forms. Inner products are over the readings less their weighted mean.
@@ -42,12 +39,13 @@ class TwoValuedNoise {
       for (const double share : {0.1, 0.4, 0.6, 0.9}) {
         const double rest = std::sqrt(std::max(1 - share * (1 - share) * delay * delay, 0.05));
         starts.push_back({delay * all_s, share, rest * all_s});
-        for (int step = 0; step < kFirstSteps; ++step) Improve(&starts.back());
+        for (int step = 0; step < kScatterRules.delay_first_steps; ++step) Improve(&starts.back());
       }
     Values best = *std::max_element(starts.begin(), starts.end(), [](const Values& a, const Values& b) {
       return a.gain_nats < b.gain_nats;
     });
-    for (int step = 0; step < kDelaySteps && best.gain_nats > kFirstNats; ++step) Improve(&best);
+    for (int step = 0; step < kScatterRules.delay_steps && best.gain_nats > kScatterRules.delay_first; ++step)
+      Improve(&best);
     return best;
   }
 
@@ -220,7 +218,7 @@ DelayedNoise FitShape(const std::vector<ReadingGroup>& groups, const NoiseModel&
     set(log_odds);
     return DelayedLogLikelihood(groups, scales, noise);
   };
-  set(touches::Maximise(at, -1, 7, kSections, log_likelihood));
+  set(touches::Maximise(at, -1, 7, kScatterRules.delay_sections, log_likelihood));
   return noise;
 }
 

@@ -8,17 +8,13 @@
 #include <numeric>
 #include <utility>
 
+#include "server/diagnosis/selection/scatter/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kLopsidedZ = 4.4;           // two-sided p of 1e-5
-constexpr double kLopsidedRatio = 1.1;       // of the two sides
-constexpr double kFarthest = 4;              // scales: a single reading counts for no more
-constexpr size_t kMinReadings = 120;         // of one finger
 constexpr double kSigmaOverMedian = 1.4826;  // of absolute values, of a normal distribution
-constexpr double kOutermost = 0.025;
 
 double QuantileOf(std::vector<double> values, double share) {
   const size_t at =
@@ -52,23 +48,25 @@ Leads LeadsOf(const std::vector<touches::ReadingGroup>& groups, int finger) {
     sizes.push_back(std::abs(leads.late_s.back()));
     touch.push_back(k);
   }
-  if (sizes.size() < kMinReadings) return {};
+  if (sizes.size() < kScatterRules.min_lopsided_readings) return {};
   const double scale_s = kSigmaOverMedian * QuantileOf(sizes, 0.5);
   if (!(scale_s > 0)) return {};
   leads.moment.assign(groups.size(), 0);
   for (size_t j = 0; j < touch.size(); ++j)
-    leads.moment[touch[j]] = std::pow(std::clamp(leads.late_s[j] / scale_s, -kFarthest, kFarthest), 3);
+    leads.moment[touch[j]] = std::pow(std::clamp(leads.late_s[j] / scale_s, -kScatterRules.farthest.value(),
+                                                 kScatterRules.farthest.value()),
+                                      3);
   return leads;
 }
 
 std::optional<LopsidedScatter> Assess(const Leads& leads) {
   LopsidedScatter found;
   found.z = leads.Z();
-  if (std::abs(found.z) < kLopsidedZ) return std::nullopt;
-  found.late_s = QuantileOf(leads.late_s, 1 - kOutermost);
-  found.early_s = -QuantileOf(leads.late_s, kOutermost);
+  if (std::abs(found.z) < kScatterRules.lopsided) return std::nullopt;
+  found.late_s = QuantileOf(leads.late_s, 1 - kScatterRules.outermost);
+  found.early_s = -QuantileOf(leads.late_s, kScatterRules.outermost);
   const double far = found.z > 0 ? found.late_s : found.early_s, near = found.late_s + found.early_s - far;
-  if (far < kLopsidedRatio * near) return std::nullopt;
+  if (far < kScatterRules.lopsided_ratio * near) return std::nullopt;
   return found;
 }
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/selection/scatter/rules.h"
+#include "server/diagnosis/touches/noise/rules.h"
+
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMinComplete = 60;
-constexpr double kForgetsNats = 4;  // simulated walks of 960 touches: 1 in 300 is beyond
 
 // Orthonormal contrasts of complete touches: their correlated noise is independent of one another.
 struct Course {
@@ -134,13 +134,13 @@ CorrelatedLikelihood SmoothLikelihood(const Course& course, double ratio, double
 
 // Standard error of the logarithm of one coordinate: curvature of the likelihood along it.
 double LogError(const Course& course, double ratio, double time_s, bool of_time) {
-  constexpr double kStep = 0.2;
   const auto at = [&](double step) {
     const double factor = std::exp(step);
     return Likelihood(course, of_time ? ratio : ratio * factor, of_time ? time_s * factor : time_s)
         .log_likelihood;
   };
-  const double curvature = (2 * at(0) - at(kStep) - at(-kStep)) / (kStep * kStep);
+  const double curvature = (2 * at(0) - at(kScatterRules.memory_step) - at(-kScatterRules.memory_step)) /
+                           (kScatterRules.memory_step * kScatterRules.memory_step);
   return curvature > 1e-3 ? 1 / std::sqrt(curvature) : 30;
 }
 
@@ -192,7 +192,7 @@ double StepGain(const Course& course) {
 
 // A course that repeats at least three times, in steps of a quarter of a cycle over the whole session.
 double PeriodGain(const Course& course) {
-  constexpr int kPhases = 12, kMinCycles = 3;
+  constexpr int kPhases = 12;
   const int n = course.touches(), channels = course.channels;
   std::vector<double> at_s(n, 0.0);
   double squares = 0;
@@ -201,7 +201,7 @@ double PeriodGain(const Course& course) {
   const double count = static_cast<double>(n) * channels, span_s = at_s.back();
   double best = -INFINITY;
   int tried = 0;
-  for (double cycles = kMinCycles; cycles <= n / 8.0; cycles += 0.25, ++tried) {
+  for (double cycles = kScatterRules.min_cycles; cycles <= n / 8.0; cycles += 0.25, ++tried) {
     std::vector<double> sum(static_cast<size_t>(kPhases) * channels, 0.0);
     double touches[kPhases] = {};
     for (int k = 0; k < n; ++k) {
@@ -258,7 +258,7 @@ struct SessionCourse {
 std::optional<SessionCourse> SessionOf(const touches::Observations& o, const std::vector<double>& residuals) {
   if (!o.set->has_session_time || o.fingers < 2) return std::nullopt;
   SessionCourse session{CourseOf(o, residuals)};
-  if (session.course.touches() < kMinComplete) return std::nullopt;
+  if (session.course.touches() < kScatterRules.min_complete) return std::nullopt;
   double span_s = 0;
   for (const double gap_s : session.course.gap_s)
     if (std::isfinite(gap_s)) span_s += gap_s;
@@ -292,12 +292,17 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
   found.period_gain_nats = PeriodGain(course);
   const double ratio_error = LogError(course, ratio, time_s, false);
   const double time_error = LogError(course, ratio, time_s, true);
-  constexpr double kMaxStep = 2;  // of a logarithm
   // The noise without memory depends on the ratio and the time too.
   const double by_ratio_s =
-      Likelihood(course, ratio * std::exp(std::min(ratio_error, kMaxStep)), time_s).white_s - best.white_s;
+      Likelihood(course, ratio * std::exp(std::min(ratio_error, kScatterRules.memory_max_step.value())),
+                 time_s)
+          .white_s -
+      best.white_s;
   const double by_time_s =
-      Likelihood(course, ratio, time_s * std::exp(std::min(time_error, kMaxStep))).white_s - best.white_s;
+      Likelihood(course, ratio,
+                 time_s * std::exp(std::min(time_error, kScatterRules.memory_max_step.value())))
+          .white_s -
+      best.white_s;
   found.white_s = {best.white_s, std::hypot(best.white_s / std::sqrt(2 * count), by_ratio_s, by_time_s), 0};
   found.sigma_s = {best.white_s * std::sqrt(ratio), 0, found.gain_nats};
   found.sigma_s.std_error = 0.5 * found.sigma_s.value * ratio_error;
@@ -306,12 +311,11 @@ std::optional<NoiseMemory> FindNoiseMemory(const touches::Observations& o,
 }
 
 bool RevertsToMean(const NoiseMemory& memory) {
-  return memory.forgets_nats > kForgetsNats;
+  return memory.forgets_nats > kScatterRules.forgets;
 }
 
 DeclaredMemory AssessDeclaredMemory(const touches::Observations& o, const std::vector<double>& residuals,
                                     double sigma_s, double time_s) {
-  constexpr double kRuledOutNats = 5;
   const std::optional<SessionCourse> session = SessionOf(o, residuals);
   if (!session || !(sigma_s > 0) || time_s > session->max_s) return {};
   const Course& course = session->course;
@@ -327,7 +331,8 @@ DeclaredMemory AssessDeclaredMemory(const touches::Observations& o, const std::v
     declared = std::max(declared, profiled.log_likelihood - 0.5 * count * (over - 1 - std::log(over)));
   }
   const double best = FindBest(Likelihood, course, session->min_s, session->max_s).likelihood.log_likelihood;
-  return {none - declared > kRuledOutNats, best - declared > kRuledOutNats};
+  return {none - declared > touches::kNoiseRules.declared_excluded,
+          best - declared > touches::kNoiseRules.declared_excluded};
 }
 
 }  // namespace touchstone::diagnosis::selection

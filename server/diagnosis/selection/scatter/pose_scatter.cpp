@@ -8,16 +8,11 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/scatter/rules.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kMotionNats = 10;
-constexpr double kAheadOfNoiseNats = 4;
-constexpr double kMinScatterDegrees = 60;
-constexpr int kRatios = 48;  // of the two scatters' squares that are tried
-constexpr double kSmallestRatio = 0.01, kLargestRatio = 100;
 
 // Of a pose, of a translation along the row of fingers and across it, of a tilt of the row, of the speed.
 enum MotionColumn { kAlong = kPoseValues, kAcross, kTilt, kSpeed, kMotionColumns };
@@ -104,9 +99,10 @@ Fit FitMotion(const std::vector<Direction>& directions) {
   Fit best;
   if (!(squares > 0) || !(added > 0)) return best;
   const double unit = weight / added;  // a ratio of 1 adds as much as the noise has, on average
-  for (int step = 0; step < kRatios; ++step) {
-    const double ratio =
-        kSmallestRatio * std::pow(kLargestRatio / kSmallestRatio, static_cast<double>(step) / (kRatios - 1));
+  for (int step = 0; step < kScatterRules.motion_ratios; ++step) {
+    const double ratio = kScatterRules.smallest_ratio *
+                         std::pow(kScatterRules.largest_ratio / kScatterRules.smallest_ratio,
+                                  static_cast<double>(step) / (kScatterRules.motion_ratios - 1));
     double scaled = 0, logs = 0;
     for (const Direction& d : directions) {
       const double variance = 1 + ratio * unit * d.added;
@@ -170,7 +166,7 @@ std::optional<PoseScatter> FindPoseScatter(const touches::Observations& o, const
   const std::vector<Repeat> repeats = RepeatsOf(o, d, residuals);
   double degrees = 0;
   for (const Repeat& repeat : repeats) degrees += repeat.weight * (o.fingers - 1);
-  if (degrees < kMinScatterDegrees) return std::nullopt;
+  if (degrees < kScatterRules.min_motion_dof) return std::nullopt;
   Fit best;
   const Motion* motion = nullptr;
   for (const Motion& tried : kMotions) {
@@ -180,9 +176,11 @@ std::optional<PoseScatter> FindPoseScatter(const touches::Observations& o, const
   double noise_nats =
       noise.slope.gain_nats + noise.degrees_of_freedom.gain_nats + noise.length_sigma_m.gain_nats;
   if (!noise.channel_sigma_s.empty()) noise_nats += noise.channel_sigma_s[0].gain_nats;
-  if (motion == nullptr || best.gain_nats < std::max(kMotionNats, noise_nats - kAheadOfNoiseNats))
+  if (motion == nullptr ||
+      best.gain_nats < std::max(kScatterRules.motion.value(), noise_nats - kScatterRules.ahead_of_noise))
     return std::nullopt;
-  PoseScatter found{best.motion, best.gain_nats, best.gain_nats > noise_nats + kAheadOfNoiseNats, ""};
+  PoseScatter found{best.motion, best.gain_nats, best.gain_nats > noise_nats + kScatterRules.ahead_of_noise,
+                    ""};
   found.words = MotionInWords(*motion, best.motion, found.ahead);
   return found;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/diagnosis/selection/scatter/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
@@ -15,15 +16,6 @@ namespace {
 
 using touches::NoiseModel;
 using touches::ReadingGroup;
-
-constexpr double kDelayNats = 10;       // gain that a delay of some shape needs
-constexpr double kTwoValuesNats = 3;    // over no delays beside the same noise, for other shapes to be tried
-constexpr double kDelayLengthNats = 3;  // by which a delay of the travel must be ahead of one of the time,
-constexpr double kOneDelayedNats = 3;   // one finger of all of them,
-constexpr double kDelayScalesNats = 3;  // and noise of the kinds found without delays of plain noise
-constexpr size_t kMinDelayTouches = 60;
-constexpr size_t kMaxDelayTouches = 800;  // of a large set, evenly
-constexpr double kMinOfEachValue = 10;    // readings
 
 std::string DelayInWords(const RandomDelay& found, int fingers) {
   const std::string whose = found.noise.finger < 0
@@ -60,7 +52,7 @@ std::vector<ReadingGroup> ThreeFingersOf(const std::vector<ReadingGroup>& all) {
   for (const ReadingGroup& group : all)
     if (group.residual_s.size() >= 3 && group.residual_s.size() <= kMaxDelayedFingers)
       complete.push_back(group);
-  const size_t count = std::min(complete.size(), kMaxDelayTouches);
+  const size_t count = std::min(complete.size(), kScatterRules.max_delay_touches.value());
   for (size_t j = 0; j < count; ++j) kept.push_back(complete[complete.size() * j / count]);
   return kept;
 }
@@ -81,9 +73,12 @@ class DelaySearch {
     for (const bool of_length : {false, true})
       for (int finger = -1; finger < fingers_ && (speeds_ || !of_length); ++finger) {
         const TwoValues two = FitTwoValues(groups_, scales, finger, of_length);
-        if (std::min(two.late_readings, two.readings - two.late_readings) < kMinOfEachValue) continue;
-        const double own = (of_length ? kDelayLengthNats : 0) + (finger >= 0 ? kOneDelayedNats : 0);
-        if (two.gain_nats - own < (best ? best->gain_nats - handicap : kTwoValuesNats)) continue;
+        if (std::min(two.late_readings, two.readings - two.late_readings) < kScatterRules.min_of_each_value)
+          continue;
+        const double own = (of_length ? kScatterRules.delay_of_length.value() : 0) +
+                           (finger >= 0 ? kScatterRules.one_finger.value() : 0);
+        if (two.gain_nats - own < (best ? best->gain_nats - handicap : kScatterRules.two_values.value()))
+          continue;
         best = RandomDelay{two.noise, {}, 0, false, false, two.gain_nats, ""};
         best->sigma_s.std_error = two.noise.sigma_s / std::sqrt(two.degrees_of_freedom);
         handicap = own;
@@ -100,7 +95,7 @@ class DelaySearch {
     }
     best->sigma_s.value = best->noise.sigma_s;
     if (best->gain_nats < handicap) return std::nullopt;
-    best->ahead = best->gain_nats >= handicap + kDelayNats;
+    best->ahead = best->gain_nats >= handicap + kScatterRules.delay;
     return best;
   }
 
@@ -116,7 +111,7 @@ class DelaySearch {
 std::optional<RandomDelay> FindRandomDelay(const touches::NoiseSample& sample,
                                            const touches::NoiseFindings& noise, int fingers) {
   const std::vector<ReadingGroup> groups = ThreeFingersOf(sample.groups);
-  if (groups.size() < kMinDelayTouches) return std::nullopt;
+  if (groups.size() < kScatterRules.min_delay_touches) return std::nullopt;
   NoiseModel without = noise.model;
   const DelaySearch search(groups, fingers, touches::ProfileSigma(groups, &without));
 
@@ -126,7 +121,8 @@ std::optional<RandomDelay> FindRandomDelay(const touches::NoiseSample& sample,
   scales.shape = touches::NoiseShape::kGaussian;
   if (scales.slope > 0 || scales.length_share > 0 || !scales.channel_scale.empty()) {
     std::optional<RandomDelay> scaled = search.Best(scales);
-    if (scaled && (!best || scaled->gain_nats > best->gain_nats + kDelayScalesNats)) best = std::move(scaled);
+    if (scaled && (!best || scaled->gain_nats > best->gain_nats + kScatterRules.delay_scales))
+      best = std::move(scaled);
   }
   if (!best) return std::nullopt;
   if (best->noise.of_length) best->length_m = best->noise.size / sample.rms_slowness_s_per_m;

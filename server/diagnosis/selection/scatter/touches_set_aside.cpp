@@ -5,14 +5,13 @@
 #include <cmath>
 #include <map>
 
+#include "server/diagnosis/selection/scatter/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
 using engine::Division;
-
-constexpr int kSlips = 3;  // readings
 
 // Which of `count` values is largest in size; -1: none is finite.
 int LargestOf(const double* values, int count) {
@@ -56,7 +55,8 @@ engine::SetAside AssessTouchesSetAside(const touches::Observations& o, const std
     faces.group.push_back(face % 2 == 1 ? face - 1 : face + 1);
     fingers.group.push_back(LargestOf(&residuals[static_cast<size_t>(k) * o.fingers], o.fingers));
   }
-  return engine::AssessSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches", kSlips);
+  return engine::AssessSetAside(aside, {objects, rounds, faces, fingers}, rmse_s, noise_s, "touches",
+                                kScatterRules.slips);
 }
 
 }  // namespace touchstone::diagnosis::selection

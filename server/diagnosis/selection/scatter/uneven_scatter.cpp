@@ -13,6 +13,8 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition/uneven_parts.h"
+#include "server/diagnosis/selection/scatter/rules.h"
+#include "server/diagnosis/touches/noise/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -21,12 +23,6 @@ using touches::NoiseModel;
 using touches::NoiseShape;
 using touches::ReadingGroup;
 
-constexpr double kTailsWithinNats = 10;  // that tails within the parts must earn
-constexpr double kOneFingerNats = 3;     // by which one finger must be ahead of all together
-constexpr size_t kRepeatsAsked = 60;     // groups, for repeats to be asked
-constexpr int kMinTouchesOfPart = 15;
-constexpr int kMaxParts = 24;
-constexpr size_t kMaxScatterGroups = 3000;  // of a large set, evenly
 constexpr int kScatterQuarters = 4;
 constexpr double kTails[] = {2, 4, 8, 20};  // degrees of freedom that are tried
 
@@ -66,7 +62,7 @@ Partition ByValue(const touches::Observations& o, const std::vector<double>& val
   Partition found{std::move(covariate), std::move(by), {}, std::vector<int>(o.size(), -1)};
   std::map<double, int> parts;
   for (const double x : value) parts.emplace(x, 0);
-  if (parts.size() > kMaxParts) return found;
+  if (static_cast<int>(parts.size()) > kScatterRules.max_parts) return found;
   for (auto& [x, part] : parts) {
     part = static_cast<int>(found.names.size());
     found.names.push_back(absl::StrFormat("%s%g%s", before, x, after));
@@ -111,7 +107,7 @@ ScatterParts ScatterPartsOf(const std::vector<ReadingGroup>& groups, const Parti
   for (const ReadingGroup& group : groups)
     if (partition.part[group.index] >= 0) all[partition.part[group.index]].push_back(group);
   for (size_t j = 0; j < all.size(); ++j) {
-    if (all[j].size() < kMinTouchesOfPart) continue;
+    if (static_cast<int>(all[j].size()) < kScatterRules.min_touches_of_part) continue;
     names->push_back(partition.names[j]);
     kept.push_back(std::move(all[j]));
   }
@@ -194,7 +190,7 @@ std::optional<UnevenScatter> CompareScatter(const std::vector<ReadingGroup>& gro
   for (size_t j = 0; j < parts.size(); ++j)
     found.parts.push_back({names[j], each.scale_s[j], static_cast<int>(parts[j].size())});
   found.test = *test;
-  found.tails_remain = each.any - each.gaussian > kTailsWithinNats;
+  found.tails_remain = each.any - each.gaussian > touches::kNoiseRules.enter;
   return found;
 }
 
@@ -289,11 +285,11 @@ std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& o, c
   if (d.travel_m.size() != static_cast<size_t>(o.size()) * o.fingers || noise.poll_interval_s.gain_nats > 0)
     return std::nullopt;
   const std::vector<ReadingGroup>& source =
-      sample.repeats.size() >= kRepeatsAsked ? sample.repeats : sample.groups;
+      sample.repeats.size() >= touches::kNoiseRules.min_repeats ? sample.repeats : sample.groups;
   // What a mean over repeats has followed says nothing of their scatter.
   const double own_share = &source == &sample.repeats ? OwnScatterShare(o, source) : 1;
   std::vector<ReadingGroup> groups;
-  const size_t kept = std::min(source.size(), kMaxScatterGroups);
+  const size_t kept = std::min(source.size(), kScatterRules.max_uneven_touches.value());
   for (size_t j = 0; j < kept; ++j) groups.push_back(source[source.size() * j / kept]);
 
   const std::vector<Partition> partitions = PartitionsOf(o, d);
@@ -305,7 +301,7 @@ std::optional<UnevenScatter> FindUnevenScatter(const touches::Observations& o, c
   std::optional<UnevenScatter> worst;
   for (const View& view : views) {
     std::optional<UnevenScatter> here = WorstPartition(view, partitions, own_share, tried, o.fingers);
-    if (here && (!worst || here->test.gain_nats > worst->test.gain_nats + kOneFingerNats))
+    if (here && (!worst || here->test.gain_nats > worst->test.gain_nats + kScatterRules.one_finger))
       worst = std::move(here);
   }
   return worst;

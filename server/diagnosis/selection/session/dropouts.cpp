@@ -8,15 +8,12 @@
 #include <vector>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/diagnosis/touches/noise/noise_sample.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kMinSilent = 10;     // contacts
-constexpr double kDifferentP = 1e-6;  // of levels that miss alike
-constexpr double kWorthARow = 0.02;   // share of rows without any contact that is worth a sentence
 
 struct Level {
   std::string name;  // "finger r"
@@ -88,10 +85,10 @@ std::string DropoutsInWords(const touches::Observations& o, const touches::Predi
     silent_rows += !any;
   }
   std::string words;
-  if (silent_rows > kWorthARow * o.size())
+  if (silent_rows > kSessionRules.silent_rows * o.size())
     words = absl::StrFormat("In %.0f of %d rows no finger reported.", silent_rows, o.size());
-  if (silent_readings < kMinSilent) return words;
-  double min_p = kDifferentP;
+  if (silent_readings < kSessionRules.min_silent) return words;
+  double min_p = kSessionRules.missed_p;
   std::string where;
   for (const std::vector<Level>* levels : {&by_finger, &by_object, &by_slope}) {
     const double p = DifferenceP(*levels, o.fingers);

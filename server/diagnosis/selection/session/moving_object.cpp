@@ -14,14 +14,11 @@
 #include "server/base/units.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
 #include "server/diagnosis/selection/session/repeats.h"
+#include "server/diagnosis/selection/session/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr double kMovingNats = 10;
-constexpr double kMinMovingDegrees = 60;
-constexpr double kMaxOrderShare = 0.3;  // of the variance of time that poses of unrepeated touches explain
-constexpr int kMaxMovingRounds = 20, kMaxMovingObjects = 20;
 constexpr int kTranslations = 3;
 
 // A touch of which every finger has a place.
@@ -61,7 +58,7 @@ Rows RowsOf(const touches::Observations& o, const touches::Prediction& d,
   rows.objects = static_cast<int>(objects.size()), rows.rounds = static_cast<int>(numbers.size());
   double repeated = 0;
   for (const auto& [pose, count] : repeats) repeated += count - 1;
-  rows.from_repeats = repeated >= kMinRepeatedShare * static_cast<double>(rows.touches.size());
+  rows.from_repeats = repeated >= kSessionRules.min_repeated_share * static_cast<double>(rows.touches.size());
   rows.degrees = (o.fingers - 1) * (rows.from_repeats ? repeated : static_cast<double>(rows.touches.size()));
   for (TimedTouch& touch : rows.touches) {
     const auto& [begin, end] = range[o.object[touch.k]];
@@ -148,7 +145,7 @@ class Comparison {
     const auto taken = static_cast<double>(span.rank());
     const double all = values_.squaredNorm();
     const double left = all - (span.Basis().transpose() * values_).squaredNorm();
-    if (taken == 0 || degrees_ < taken + kMinMovingDegrees || !(left > 0)) return gain;
+    if (taken == 0 || degrees_ < taken + kSessionRules.min_motion_dof || !(left > 0)) return gain;
     gain.nats = 0.5 * degrees_ * std::log(all / left) - 0.5 * taken * std::log(degrees_);
     gain.p = FisherTail((all - left) / taken / (left / (degrees_ - taken)), taken, degrees_ - taken);
     gain.values = span.Solve(values_);
@@ -187,9 +184,10 @@ std::optional<MovingObject> FindMovingObject(const touches::Observations& o, con
                                              const std::vector<double>& residuals) {
   if (o.fingers < 2 || !HasPoseDetails(d, residuals)) return std::nullopt;
   const Rows rows = RowsOf(o, d, residuals);
-  if (rows.objects == 0 || rows.objects > kMaxMovingObjects || rows.degrees < kMinMovingDegrees)
+  if (rows.objects == 0 || rows.objects > kSessionRules.max_moving_objects ||
+      rows.degrees < kSessionRules.min_motion_dof)
     return std::nullopt;
-  if (!rows.from_repeats && OrderShare(o, rows) > kMaxOrderShare) return std::nullopt;
+  if (!rows.from_repeats && OrderShare(o, rows) > kSessionRules.max_order_share) return std::nullopt;
   const Comparison comparison(o, d, residuals, rows);
   constexpr int kTried = 2;
   const auto steadily = [&](int first) {
@@ -200,8 +198,8 @@ std::optional<MovingObject> FindMovingObject(const touches::Observations& o, con
   };
   const Comparison::Gain moves = steadily(0), turns = steadily(kTranslations);
   const Comparison::Gain& best = turns.nats > moves.nats ? turns : moves;
-  if (best.nats < kMovingNats + std::log(kTried)) return std::nullopt;
-  if (rows.rounds > 1 && rows.rounds <= kMaxMovingRounds) {
+  if (best.nats < kSessionRules.min_gain + std::log(kTried)) return std::nullopt;
+  if (rows.rounds > 1 && rows.rounds <= kSessionRules.max_moving_rounds) {
     const Comparison::Gain by_round = comparison.Of(
         static_cast<Eigen::Index>(rows.rounds) * rows.objects * kPoseValues,
         [&](const TimedTouch& touch, const auto& own, Eigen::Ref<Eigen::MatrixXd> columns) {

@@ -10,20 +10,11 @@
 #include <cmath>
 
 #include "server/base/text/readable_time.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMinTouches = 60;
-constexpr int kIterations = 80;
-constexpr double kMinShare = 0.04;      // fewer are outliers
-constexpr double kMinPartialNats = 12;  // over each single distribution
-constexpr double kMinSeparation =
-    2;  // of the groups over their scatter: ticks alone look like two that overlap
-constexpr double kMaxAutocorrelation = 0.25;
-constexpr double kMinWithinPoses = 0.6;  // variance of who has it within poses, over all of it
-constexpr double kNoTails = 1e3;
 
 // Complete touches, as orthonormal contrasts of their fingers.
 struct Cloud {
@@ -75,7 +66,7 @@ double StudentLogLikelihood(const Eigen::MatrixXd& y) {
   const long n = y.cols();
   const double f = static_cast<double>(y.rows());
   double best = -INFINITY;
-  for (double tails = 2; tails < kNoTails; tails *= 1.6) {
+  for (double tails = 2; tails < kSessionRules.no_tails; tails *= 1.6) {
     Eigen::VectorXd mean = y.rowwise().mean();
     double scale2 = (y.colwise() - mean).squaredNorm() / static_cast<double>(y.size());
     Eigen::ArrayXd squares;
@@ -107,7 +98,7 @@ Mixture FitMixture(const Eigen::MatrixXd& y, const Eigen::VectorXd& start) {
   m.mean = y.rowwise().mean() - 0.3 * start;
   m.offset = start, m.share = 0.3;
   m.variance = (y.colwise() - y.rowwise().mean().eval()).squaredNorm() / count;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kSessionRules.offset_steps; ++iteration) {
     const Eigen::ArrayXd without = (y.colwise() - m.mean).colwise().squaredNorm().array() / m.variance;
     const Eigen::ArrayXd with =
         (y.colwise() - (m.mean + m.offset)).colwise().squaredNorm().array() / m.variance;
@@ -136,7 +127,8 @@ bool IsAtRandom(const touches::Observations& o, const Cloud& cloud, const Eigen:
   const double variance = apart.square().mean();
   if (!(variance > 0)) return false;
   const long n = has.size();
-  if ((apart.head(n - 1) * apart.tail(n - 1)).mean() > kMaxAutocorrelation * variance) return false;
+  if ((apart.head(n - 1) * apart.tail(n - 1)).mean() > kSessionRules.max_autocorrelation * variance)
+    return false;
   std::vector<double> sum(o.poses, 0), squares(o.poses, 0);
   std::vector<int> count(o.poses, 0);
   for (long t = 0; t < n; ++t) {
@@ -149,7 +141,8 @@ bool IsAtRandom(const touches::Observations& o, const Cloud& cloud, const Eigen:
     within += squares[pose] - sum[pose] * sum[pose] / count[pose];
     dof += count[pose] - 1;
   }
-  return dof < kMinTouches / 2 || within / dof > kMinWithinPoses * variance;
+  return dof < kSessionRules.min_offset_touches / 2 ||
+         within / dof > kSessionRules.min_within_poses * variance;
 }
 
 }  // namespace
@@ -158,7 +151,7 @@ std::optional<PartialOffset> FindPartialOffset(const touches::Observations& o,
                                                const std::vector<double>& residuals) {
   if (o.fingers < 2) return std::nullopt;
   const Cloud cloud = CloudOf(o, residuals);
-  if (static_cast<int>(cloud.touch.size()) < kMinTouches) return std::nullopt;
+  if (static_cast<int>(cloud.touch.size()) < kSessionRules.min_offset_touches) return std::nullopt;
   const double sigma = std::sqrt((cloud.y.colwise() - cloud.y.rowwise().mean().eval()).squaredNorm() /
                                  static_cast<double>(cloud.y.size()));
   Mixture best;
@@ -173,10 +166,11 @@ std::optional<PartialOffset> FindPartialOffset(const touches::Observations& o,
   const auto [white, log_volume] = Whitened(cloud.y);
   const double single = log_volume + std::max(GaussianLogLikelihood(white), StudentLogLikelihood(white));
   found.gain_nats = best.log_likelihood - more - single;
-  if (found.gain_nats < kMinPartialNats || best.offset.norm() < kMinSeparation * std::sqrt(best.variance))
+  if (found.gain_nats < kSessionRules.offset ||
+      best.offset.norm() < kSessionRules.min_separation * std::sqrt(best.variance))
     return std::nullopt;
   if (best.share > 0.5) best.share = 1 - best.share, best.offset = -best.offset;
-  if (best.share < kMinShare || !IsAtRandom(o, cloud, best.has)) return std::nullopt;
+  if (best.share < kSessionRules.min_offset_share || !IsAtRandom(o, cloud, best.has)) return std::nullopt;
   found.share = best.share;
   const Eigen::VectorXd offset = cloud.basis.transpose() * best.offset;
   found.offset_s.assign(offset.data(), offset.data() + offset.size());

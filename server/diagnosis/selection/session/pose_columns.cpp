@@ -3,6 +3,8 @@
 #include <cmath>
 #include <map>
 
+#include "server/diagnosis/touches/rules.h"
+
 namespace touchstone::diagnosis::selection {
 
 bool HasPoseColumns(const touches::Observations& o, const touches::Prediction& d,
@@ -10,7 +12,7 @@ bool HasPoseColumns(const touches::Observations& o, const touches::Prediction& d
   for (int i = 0; i < o.fingers; ++i) {
     const size_t e = static_cast<size_t>(k) * o.fingers + i;
     if (!std::isfinite(residuals[e]) || !d.contact_m[e].allFinite() || !d.normal[e].allFinite() ||
-        !std::isfinite(d.inverse_speed_s_per_m[e]) || !(d.cos_incidence[e] > kMinCosine))
+        !std::isfinite(d.inverse_speed_s_per_m[e]) || !(d.cos_incidence[e] > touches::kTouchRules.min_cosine))
       return false;
   }
   return true;

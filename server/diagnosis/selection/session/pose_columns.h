@@ -13,8 +13,7 @@ namespace touchstone::diagnosis::selection {
 inline constexpr int kPoseValues = 6;
 
 // Whether every finger of touch k has a residual [k * fingers + i] and a contact whose place is a function of the pose: beyond
-// kMinCosine of incidence it is none.
-inline constexpr double kMinCosine = 0.1;
+// touches::kTouchRules.min_cosine of incidence it is none.
 bool HasPoseColumns(const touches::Observations& observations, const touches::Prediction& details,
                     const std::vector<double>& residuals, int k);
 

@@ -11,9 +11,6 @@
 
 namespace touchstone::diagnosis::selection {
 
-// Of the touches that must be repeats for these alone to tell, where a misfit would say something else.
-inline constexpr double kMinRepeatedShare = 0.25;
-
 class Repeats {
  public:
   // Touches of one pose in which the same fingers report. Both must outlive it.

@@ -11,17 +11,12 @@
 #include "server/base/numbers/random.h"
 #include "server/base/text/readable_time.h"
 #include "server/base/units.h"
+#include "server/diagnosis/selection/rules.h"
 #include "server/diagnosis/selection/session/pose_columns.h"
+#include "server/diagnosis/selection/session/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMaxRounds = 40;
-constexpr double kRoundP = 1e-6;
-constexpr double kPermutedBelowP = 0.01;
-constexpr int kPermutations = 199;
-constexpr double kNegligibleRounds = 0.015;  // share of the floor
-constexpr double kMinRoundDegrees = 8;
 
 // The touches of one object with all their fingers, each with its pose and round.
 struct ObjectRounds {
@@ -73,7 +68,7 @@ void AddObject(const touches::Observations& o, const touches::Prediction& d,
   const int repeats = CentrePoses(object.pose, o.fingers, &rows);
   const ColumnSpan span(rows.rightCols(values));
   const double dof = static_cast<double>(repeats) * (o.fingers - 1);
-  if (dof < static_cast<double>(span.rank()) + kMinRoundDegrees) return;
+  if (dof < static_cast<double>(span.rank()) + kSessionRules.min_round_dof) return;
   const Eigen::VectorXd moved = span.Solve(rows.col(0));  // the least: about the mean of the rounds
   const Eigen::MatrixXd basis = span.Basis();
   squares->fits.push_back({&object, basis, rows.col(0)});
@@ -111,12 +106,12 @@ double ExplainedInOtherOrder(const std::vector<ObjectFit>& fits, int fingers, Ra
 double PermutedP(const Squares& squares, int fingers) {
   RandomStream random(0, RandomDomain::kDiagnosis);
   double sum = 0, sum2 = 0;
-  for (int n = 0; n < kPermutations; ++n) {
+  for (int n = 0; n < kSelectionRules.orders; ++n) {
     const double explained = ExplainedInOtherOrder(squares.fits, fingers, &random);
     sum += explained, sum2 += explained * explained;
   }
-  const double mean = sum / kPermutations;
-  const double variance = (sum2 - sum * mean) / (kPermutations - 1);
+  const double mean = sum / kSelectionRules.orders;
+  const double variance = (sum2 - sum * mean) / (kSelectionRules.orders - 1);
   if (!(mean > 0) || !(variance > 0)) return 1;
   return GammaTail(std::max(squares.explained, 0.0), mean, variance);
 }
@@ -130,7 +125,8 @@ RoundStructure FindRoundStructure(const touches::Observations& o, const touches:
   Squares squares;
   const std::vector<ObjectRounds> objects = RoundsOf(o, d, residuals);
   for (const ObjectRounds& object : objects)
-    if (object.rounds >= 2 && object.rounds <= kMaxRounds) AddObject(o, d, residuals, object, &squares);
+    if (object.rounds >= 2 && object.rounds <= kSessionRules.max_rounds)
+      AddObject(o, d, residuals, object, &squares);
   const double rest_dof = squares.all_dof - squares.explained_dof;
   const double rest = squares.all - squares.explained;
   if (!(squares.explained_dof > 0) || !(rest_dof > 0) || !(rest > 0)) return found;
@@ -141,12 +137,12 @@ RoundStructure FindRoundStructure(const touches::Observations& o, const touches:
   const double f = std::max(squares.explained / squares.explained_dof / (rest / rest_dof), 0.0);
   found.p = FisherTail(f, squares.explained_dof, rest_dof);
   // The F test takes noise of one size for granted.
-  if (found.p < kPermutedBelowP) found.p = std::max(found.p, PermutedP(squares, o.fingers));
+  if (found.p < kSessionRules.permuted_below_p) found.p = std::max(found.p, PermutedP(squares, o.fingers));
   return found;
 }
 
 bool SharesRounds(const RoundStructure& rounds, double sigma_s) {
-  return rounds.p < kRoundP && rounds.sigma_s < (1 - kNegligibleRounds) * sigma_s;
+  return rounds.p < kSessionRules.round_p && rounds.sigma_s < (1 - kSessionRules.negligible_rounds) * sigma_s;
 }
 
 std::string RoundsInWords(const RoundStructure& rounds, double sigma_s) {

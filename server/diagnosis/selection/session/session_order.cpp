@@ -9,14 +9,11 @@
 #include <absl/strings/str_format.h>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/selection/session/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr size_t kMinObjectsInLine = 4;
-constexpr double kLineP = 0.01;         // of values that are no line of time
-constexpr double kSlopeErrors = 5;      // of one that grows
-constexpr double kSamePattern = 0.995;  // cosine of two effects that look alike
 constexpr double kSecondsPerHour = 3600;
 
 // The first and last touch of an object.
@@ -61,13 +58,13 @@ double GrowthPerHour(const touches::Observations& o, const std::map<int, Stretch
         wvv += weight * value.value * value.value;
     ++count;
   }
-  if (count < kMinObjectsInLine) return 0;
+  if (count < kSessionRules.min_objects_in_line) return 0;
   const double time2 = wtt - wt * wt / w;
   if (!(time2 > 0)) return 0;
   const double slope = (wtv - wt * wv / w) / time2;
   const double rest = wvv - wv * wv / w - slope * slope * time2;
-  const bool grows = std::abs(slope) * std::sqrt(time2) > kSlopeErrors;
-  return grows && ChiSquaredTail(rest, static_cast<double>(count - 2)) > kLineP ? slope : 0;
+  const bool grows = std::abs(slope) * std::sqrt(time2) > kSessionRules.slope_errors;
+  return grows && ChiSquaredTail(rest, static_cast<double>(count - 2)) > kSessionRules.line_p ? slope : 0;
 }
 
 }  // namespace
@@ -126,8 +123,9 @@ std::vector<std::pair<size_t, size_t>> PairsAtTwoSpeeds(const touches::Observati
       if (one.empty() || one.size() != other.size()) continue;
       bool same = true, apart = false;
       for (size_t c = 0; c < one.size(); ++c) {
-        for (const double speed : speeds) same &= cosine(one[c], other[c], speed) > kSamePattern;
-        apart |= cosine(one[c], other[c], 0) < kSamePattern;
+        for (const double speed : speeds)
+          same &= cosine(one[c], other[c], speed) > kSessionRules.same_pattern;
+        apart |= cosine(one[c], other[c], 0) < kSessionRules.same_pattern;
       }
       if (same && apart) pairs.emplace_back(i, j);
     }

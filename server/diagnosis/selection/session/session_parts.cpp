@@ -6,11 +6,10 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include "server/diagnosis/selection/session/rules.h"
+
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr size_t kMaxRoundsInEverySet = 6, kMaxRoundsOneByOne = 40;
-constexpr int kStretches = 20;
 
 // "round 2", "rounds 0 and 1".
 std::string WordsOfRounds(const std::vector<int>& rounds) {
@@ -32,7 +31,7 @@ std::vector<uint64_t> SetsOfRounds(size_t rounds) {
   for (size_t i = 0; i < rounds; ++i) add(uint64_t{1} << i);
   for (size_t i = 1; i < rounds; ++i) add((uint64_t{1} << i) - 1);
   add(all & 0x5555555555555555u);
-  if (rounds <= kMaxRoundsInEverySet)
+  if (rounds <= kSessionRules.max_rounds_in_every_set)
     for (uint64_t set = 1; set < all; ++set) add(set);
   return sets;
 }
@@ -49,7 +48,7 @@ class PartList {
     std::set<int> numbers;
     for (const int k : used_) numbers.insert(round_of[k]);
     const std::vector<int> rounds(numbers.begin(), numbers.end());
-    if (rounds.size() < 2 || rounds.size() > kMaxRoundsOneByOne) return;
+    if (rounds.size() < 2 || static_cast<int>(rounds.size()) > kSessionRules.max_rounds) return;
     for (uint64_t set : SetsOfRounds(rounds.size())) {
       std::vector<char> has(o_.size(), 0);
       const auto contains = [&](int k) {
@@ -68,9 +67,10 @@ class PartList {
   }
 
   void AddStretches() {
-    for (int from = 0; from < kStretches; ++from)
-      for (int to = from + 1; to <= kStretches; ++to) {
-        const size_t begin = used_.size() * from / kStretches, end = used_.size() * to / kStretches;
+    for (int from = 0; from < kSessionRules.stretches; ++from)
+      for (int to = from + 1; to <= kSessionRules.stretches; ++to) {
+        const size_t begin = used_.size() * from / kSessionRules.stretches,
+                     end = used_.size() * to / kSessionRules.stretches;
         if (begin == end || 2 * (end - begin) > used_.size()) continue;
         std::vector<char> has(o_.size(), 0);
         for (size_t i = begin; i < end; ++i) has[used_[i]] = 1;

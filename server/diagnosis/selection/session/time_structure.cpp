@@ -7,14 +7,10 @@
 #include <utility>
 
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/selection/session/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr int kMaxPermutations = 200, kMinPermutations = 30;
-constexpr int kPermutedTouches = 4'000'000;  // of all permutations together: large sets need fewer
-constexpr int kMinNeighbours = 20;
-constexpr double kNegligibleTime = 0.02;  // share of the floor
 
 // Residuals less the mean of their pose (touches with the same fingers), scaled to the variance of single ones.
 struct CentredTouches {
@@ -117,14 +113,15 @@ TimeStructure FindTimeStructure(const touches::Observations& o, const std::vecto
   const CentredTouches c = Centre(o, residuals);
   found.neighbours = static_cast<int>(c.neighbours.size());
   found.finger_z.assign(o.fingers, 0);
-  if (found.neighbours < kMinNeighbours) return found;
+  if (found.neighbours < kSessionRules.min_neighbours) return found;
   std::vector<int> at(c.touch.size());
   std::iota(at.begin(), at.end(), 0);
   std::vector<std::vector<double>> by_finger(o.fingers);
   std::vector<double> totals;
   RandomStream random(0, RandomDomain::kDiagnosis, /*index=*/1);
   const int permutations =
-      std::clamp(kPermutedTouches / static_cast<int>(c.touch.size()), kMinPermutations, kMaxPermutations);
+      std::clamp(kSessionRules.permuted_touches / static_cast<int>(c.touch.size()),
+                 kSessionRules.min_time_permutations.value(), kSessionRules.max_time_permutations.value());
   for (int n = 0; n <= permutations; ++n) {
     if (n > 0)
       for (const std::vector<int>& places : c.repeats)
@@ -150,8 +147,8 @@ void AddTimeStructure(const touches::Observations& o, const std::vector<double>&
 }
 
 bool SharesTime(const engine::NoiseFloor& floor) {
-  return floor.from_repeats && floor.time_structure_p < kTimeStructureP &&
-         floor.sigma_without_time < (1 - kNegligibleTime) * floor.sigma;
+  return floor.from_repeats && floor.time_structure_p < kSessionRules.time_p &&
+         floor.sigma_without_time < (1 - kSessionRules.negligible_time) * floor.sigma;
 }
 
 void NameTimeFirst(const touches::Observations& o, const engine::NoiseFloor& floor,

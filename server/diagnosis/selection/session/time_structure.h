@@ -9,8 +9,6 @@
 
 namespace touchstone::diagnosis::selection {
 
-inline constexpr double kTimeStructureP = 1e-4;  // of what is neither chance nor noise
-
 struct TimeStructure {
   // Lag-1 autocorrelation of pose-centred residuals, less its mean and over its spread when touches change places
   // within their poses. z > 4 does not happen by chance.

@@ -14,13 +14,11 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/text/readable_time.h"
 #include "server/diagnosis/selection/session/repeats.h"
+#include "server/diagnosis/selection/session/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-constexpr double kTurnNats = 10;
-constexpr int kMinUnitsOfPlace = 8;  // readings at each place in the turn
 
 // What a place in the turn is compared over: touches less the mean of their pose, where repeats of a pose have several places; else
 // the mean of a pose at a place, since a misfit is the same in all repeats. Scaled to the variance of one touch.
@@ -71,7 +69,7 @@ Units UnitsOf(const touches::Observations& o, const ReadingsByPose& poses) {
                                     [&](const Reading& r) { return r.place != readings[0].place; });
     if (varies) repeated += static_cast<double>(readings.size()) - 1;
   }
-  const bool from_repeats = repeated >= kMinRepeatedShare * all;
+  const bool from_repeats = repeated >= kSessionRules.min_repeated_share * all;
   Units units;
   units.values.resize(static_cast<Eigen::Index>(all), o.fingers);
   units.known = Eigen::MatrixXd::Zero(units.values.rows(), kPoseFeatures);
@@ -123,7 +121,8 @@ class Turn {
     const ReadingsByPose poses = ReadingsOf(o, residuals, places, period);
     const Units units = UnitsOf(o, poses);
     for (int place = 0; place < period; ++place)
-      if (std::count(units.place.begin(), units.place.end(), place) < kMinUnitsOfPlace) return;
+      if (std::count(units.place.begin(), units.place.end(), place) < kSessionRules.min_units_of_place)
+        return;
     const Eigen::MatrixXd known_basis = ColumnSpan(units.known).Basis();
     const auto beyond = [&](const Eigen::MatrixXd& columns) -> Eigen::MatrixXd {
       return columns - known_basis * (known_basis.transpose() * columns);
@@ -170,13 +169,13 @@ std::optional<Turns> FindTurns(const touches::Observations& o, const std::vector
   if (o.fingers < 2) return std::nullopt;
   const std::vector<int> places = PlacesInSession(*o.set);
   Turns best;
-  best.gain_nats = kTurnNats + std::log(kLongestTurn - 1.0);
-  for (int period = 2; period <= kLongestTurn; ++period) {
+  best.gain_nats = kSessionRules.min_gain + std::log(kSessionRules.longest_turn - 1.0);
+  for (int period = 2; period <= kSessionRules.longest_turn; ++period) {
     const Turn turn(o, residuals, places, period);
     if (turn.gain_nats() <= best.gain_nats) continue;
     best.period = period;
     best.gain_nats = turn.gain_nats();
-    best.p = std::min(1.0, turn.p() * (kLongestTurn - 1));
+    best.p = std::min(1.0, turn.p() * (kSessionRules.longest_turn - 1));
     best.range_s = turn.ranges().maxCoeff(&best.finger);
   }
   if (best.period == 0) return std::nullopt;

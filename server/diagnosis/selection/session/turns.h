@@ -11,8 +11,6 @@
 
 namespace touchstone::diagnosis::selection {
 
-inline constexpr int kLongestTurn = 8;  // touches
-
 // Place of each row of the set in the order of the session.
 std::vector<int> PlacesInSession(const session::MeasurementSet& set);
 

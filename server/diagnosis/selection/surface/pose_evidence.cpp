@@ -5,13 +5,11 @@
 #include <map>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/selection/surface/rules.h"
 #include "server/effects/contact/surface_departure.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
-
-// Sizes of own errors (as rows) over those that all have alike.
-constexpr double kMinOwnRatio = 0.08, kMaxOwnRatio = 35, kOwnRatioStep = 1.5;
 
 std::vector<PoseMean> MeansOf(const Workspace& workspace, const Eigen::MatrixXd& rows) {
   const touches::Contrasts& contrasts = *workspace.contrasts;
@@ -146,7 +144,8 @@ double PoseEvidence::NatsOfOwnErrors(OwnError kind) const {
     return -0.5 * n * std::log(std::max(q, 1e-300) / n) - 0.5 * log_determinant;
   };
   std::vector<double> logs;
-  for (double ratio = kMinOwnRatio; ratio < kMaxOwnRatio; ratio *= kOwnRatioStep)
+  for (double ratio = kSurfaceRules.min_own_ratio; ratio < kSurfaceRules.max_own_ratio;
+       ratio *= kSurfaceRules.own_ratio_step)
     logs.push_back(log_likelihood(ratio) - log_likelihood(0));
   const double best = *std::max_element(logs.begin(), logs.end());
   double sum = 0;

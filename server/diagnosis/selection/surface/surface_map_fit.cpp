@@ -9,12 +9,12 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/fit/support_points.h"
+#include "server/diagnosis/selection/surface/rules.h"
 #include "server/effects/contact/surface_map.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kMaxMapPoints = 400;        // of one object
 constexpr double kMapUnitMm = 1e-5;       // departures are rounded to
 constexpr double kMapPlaceUnitMm = 1e-3;  // places are rounded to, before the map is fitted
 constexpr double kMapNugget = 1e-6;       // as in the map's interpolation
@@ -31,7 +31,7 @@ model::SurfaceMapObject MapOfObject(const std::vector<engine::SmoothErrorSite>& 
   model::SurfaceMapObject object;
   object.length_mm = RoundedMm(length_m, kMapPlaceUnitMm);
   object.rms_mm = std::max(RoundedMm(rms_m, kMapUnitMm), kMapUnitMm);
-  for (const Eigen::Vector3d& place : engine::SupportPoints(places, kMaxMapPoints)) {
+  for (const Eigen::Vector3d& place : engine::SupportPoints(places, kSurfaceRules.max_map_points)) {
     model::SurfaceMapPoint point;
     for (int axis = 0; axis < 3; ++axis) point.position_mm[axis] = RoundedMm(place[axis], kMapPlaceUnitMm);
     object.points.push_back(point);

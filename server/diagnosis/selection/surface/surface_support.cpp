@@ -11,25 +11,12 @@
 #include "server/base/text/readable_time.h"
 #include "server/base/units.h"
 #include "server/diagnosis/selection/surface/pose_evidence.h"
+#include "server/diagnosis/selection/surface/rules.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
 
-constexpr int kSurfaceFolds = 8;      // of poses
-constexpr int kKnotsPerCurve = 24;    // places that stand for a curve's range
-constexpr double kLikely = 0.5;       // probability of bumps that are named
-constexpr double kSure = 0.95;        // ... where their length is the shortest that is tried
-constexpr double kUnlikely = 0.2;     // ... of a misfit that something else explains
-constexpr double kRareOdds = 0.1;     // of rare explanations, before the data
-constexpr double kElsewhereNats = 5;  // of what explains a misfit in place of bumps
-constexpr double kMaxNats = 500;      // of differences that are exponents
-// What poses left out say, by the share of the misfit that is predicted there, in its standard errors. Of sets with faint
-// bumps nine in ten had more than one, of sets with errors of their poses one in seven.
-constexpr double kNatsPerShareError = 2, kNeutralShareErrors = 0.7, kMaxShareNats = 3;
-constexpr double kUnseen = 0.9;  // the most that is claimed where they show less than one
-constexpr double kUsualMinMm = 0.05, kUsualMaxMm = 0.3;  // RMS that printing and milling leave
-constexpr double kMaxMm = 1;                             // ... beyond which it is another object
-constexpr double kApart = 100;                           // ranges between curves that share nothing
+constexpr double kMaxNats = 500;  // of differences that are exponents
 
 // Curves over a covariate: one for all, one per finger, one per object.
 std::vector<PoseFunction> CurvesOver(const std::string& name, const std::vector<double>& values,
@@ -49,11 +36,12 @@ std::vector<PoseFunction> CurvesOver(const std::string& name, const std::vector<
     curve.size = range;
     curve.place = [values, kind, range](size_t e, int finger, int object) {
       const int copy = kind == 0 ? 0 : kind == 1 ? finger : object;
-      return Eigen::Vector3d(values[e], kApart * range * copy, 0);
+      return Eigen::Vector3d(values[e], kSurfaceRules.apart * range * copy, 0);
     };
     for (int copy = 0; copy < copies; ++copy)
-      for (int knot = 0; knot < kKnotsPerCurve; ++knot)
-        curve.knots.emplace_back(lower + range * knot / (kKnotsPerCurve - 1), kApart * range * copy, 0);
+      for (int knot = 0; knot < kSurfaceRules.knots_per_curve; ++knot)
+        curve.knots.emplace_back(lower + range * knot / (kSurfaceRules.knots_per_curve - 1),
+                                 kSurfaceRules.apart * range * copy, 0);
     curves.push_back(std::move(curve));
   }
   return curves;
@@ -85,11 +73,11 @@ void PredictPoses(const PoseEvidence& evidence, const engine::Fit& fit, const en
                   int hypothesis, SurfaceSupport* support) {
   std::vector<int> fold_of_row;
   for (const PoseMean& mean : evidence.means())
-    fold_of_row.insert(fold_of_row.end(), mean.mean.rows(), mean.pose % kSurfaceFolds);
+    fold_of_row.insert(fold_of_row.end(), mean.mean.rows(), mean.pose % kSurfaceRules.folds);
   std::vector<Eigen::MatrixXd> grams;
   const Eigen::MatrixXd left =
       evidence.values() -
-      likelihood.FieldLeftOut(evidence.values(), hypothesis, fold_of_row, kSurfaceFolds, &grams);
+      likelihood.FieldLeftOut(evidence.values(), hypothesis, fold_of_row, kSurfaceRules.folds, &grams);
   const int p = fit.model.size();
   std::vector<Eigen::VectorXd> steps;
   for (Eigen::MatrixXd& gram : grams) {
@@ -109,7 +97,7 @@ void PredictPoses(const PoseEvidence& evidence, const engine::Fit& fit, const en
   for (const PoseMean& mean : evidence.means()) {
     const int size = static_cast<int>(mean.mean.rows());
     Eigen::VectorXd rest = left.col(0).segment(row, size);
-    if (p > 0) rest -= left.block(row, 1, size, p) * steps[mean.pose % kSurfaceFolds];
+    if (p > 0) rest -= left.block(row, 1, size, p) * steps[mean.pose % kSurfaceRules.folds];
     const double was = mean.mean.col(0).squaredNorm(), is = rest.squaredNorm();
     fall += was - is, fall_squares += (was - is) * (was - is);
     excess += was - size * noise_s2 / mean.weight;
@@ -132,29 +120,31 @@ void PredictPoses(const PoseEvidence& evidence, const engine::Fit& fit, const en
 // look smooth to it. So what poses left out say counts beside it, and without their word nothing is asserted.
 double SurfaceSupport::Probability() const {
   const auto odds = [this](double nats) { return std::exp(std::min(nats - field_nats, kMaxNats)); };
-  const double others = odds(0) + odds(own_nats) + kRareOdds * (odds(finger_field_nats) + odds(curve_nats));
+  const double others =
+      odds(0) + odds(own_nats) + kSurfaceRules.rare_odds * (odds(finger_field_nats) + odds(curve_nats));
   const double errors = share_error > 0 ? share / share_error : 0;
   const double nats =
-      std::clamp(kNatsPerShareError * (errors - kNeutralShareErrors), -kMaxShareNats, kMaxShareNats);
+      std::clamp(kSurfaceRules.per_share_error * (errors - kSurfaceRules.neutral_share_errors),
+                 -kSurfaceRules.max_share.value(), kSurfaceRules.max_share.value());
   const double probability = 1 / (1 + others * std::exp(-nats));
-  return errors < 1 ? std::min(probability, kUnseen) : probability;
+  return errors < 1 ? std::min(probability, kSurfaceRules.unseen.value()) : probability;
 }
 
 bool SurfaceSupport::IsSurface() const {
-  return Probability() > kLikely && !(shortest && Probability() < kSure);
+  return Probability() > kSurfaceRules.likely && !(shortest && Probability() < kSurfaceRules.sure);
 }
 
 bool SurfaceSupport::IsElsewhere() const {
-  return !IsSurface() && Probability() < kUnlikely &&
-         std::max({own_nats, finger_field_nats, curve_nats}) > kElsewhereNats;
+  return !IsSurface() && Probability() < kSurfaceRules.unlikely &&
+         std::max({own_nats, finger_field_nats, curve_nats}) > kSurfaceRules.elsewhere;
 }
 
 std::string SurfaceSupport::SizeInWords() const {
   const double rms_mm = rms_m * kMillimetresPerMetre;
   return absl::StrFormat("The surfaces differ from their meshes by %.2g mm RMS, %s (0.05 to 0.3 mm).", rms_mm,
-                         rms_mm > kUsualMaxMm   ? "more than printing and milling leave"
-                         : rms_mm < kUsualMinMm ? "less than most printing and milling leave"
-                                                : "as printing and milling leave");
+                         rms_mm > kSurfaceRules.usual_max   ? "more than printing and milling leave"
+                         : rms_mm < kSurfaceRules.usual_min ? "less than most printing and milling leave"
+                                                            : "as printing and milling leave");
 }
 
 std::string SurfaceSupport::Words(double rmse_s) const {
@@ -204,7 +194,7 @@ absl::StatusOr<SurfaceSupport> FindSurfaceSupport(const Workspace& workspace, co
   const PoseFunction field = SurfaceOf(workspace, details);
   PoseFunction per_finger = field;
   per_finger.place = [&details, size = field.size](size_t e, int finger, int) -> Eigen::Vector3d {
-    return details.contact_in_mesh_m[e] + Eigen::Vector3d(kApart * size * finger, 0, 0);
+    return details.contact_in_mesh_m[e] + Eigen::Vector3d(kSurfaceRules.apart * size * finger, 0, 0);
   };
   int best = 0, best_finger = 0;
   double sigma_finger_s = 0;
