@@ -20,6 +20,7 @@
 #include "server/diagnosis/checks/rows/round_speed.h"
 #include "server/diagnosis/checks/rows/saturated_times.h"
 #include "server/diagnosis/checks/rows/stale_rows.h"
+#include "server/diagnosis/checks/rules.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/checks/sorted_column.h"
 #include "server/diagnosis/checks/tried.h"
@@ -30,13 +31,7 @@
 namespace touchstone::diagnosis::checks {
 namespace {
 
-constexpr int kMinTouches = 12;
-constexpr double kMinSpeedMS = 1e-6;
 constexpr char kFixedFile[] = "fixed.csv";
-constexpr int kMaxParts = 4;            // with mistakes of their own
-constexpr int kMinWrong = 4;            // touches that are off by kMinMisfitM, for a mistake to be looked for
-constexpr double kMinMisfit = 0.15;     // relative: the mildest factor of times or speeds leaves more
-constexpr double kSortedMisfit = 0.15;  // relative, over all touches, from which a sorted column is one
 
 // What `compare` finds for this input; where it refuses, the error over all touches that can be compared.
 double RmseOf(const DiagnosisInput& input, ThreadPool* pool) {
@@ -249,7 +244,7 @@ void ProblemList::AddSortedColumn(const TrialResult& before) {
   double error_s2 = 0, spread_s2 = 0;
   for (const std::optional<TouchError>& touch : before.touches)
     if (touch) error_s2 += touch->error_s2, spread_s2 += touch->spread_s2;
-  if (error_s2 < kSortedMisfit * kSortedMisfit * spread_s2) return;
+  if (error_s2 < kCheckRules.sorted_misfit * kCheckRules.sorted_misfit * spread_s2) return;
   const int finger = SortedColumn(input_);
   if (finger < 0) return;
   const std::string column = absl::StrCat("t_", model::FingerName(finger, input_.set->fingers), "_us");
@@ -264,11 +259,12 @@ void ProblemList::AddSortedColumn(const TrialResult& before) {
 
 // Most files fit: no mistake that could be claimed leaves so little.
 bool NothingToExplain(const TrialResult& before) {
-  const double coarse_s = kMinMisfitM / std::max(before.speed_m_s, kMinSpeedMS);
+  const double coarse_s =
+      kCheckRules.min_misfit_m / std::max(before.speed_m_s, kCheckRules.min_speed_m_s.value());
   const auto wrong = std::count_if(before.touches.begin(), before.touches.end(), [&](const auto& touch) {
     return touch && touch->error_s2 > coarse_s * coarse_s;
   });
-  return wrong < kMinWrong && before.Relative({}) < kMinMisfit;
+  return wrong < kCheckRules.min_wrong && before.Relative({}) < kCheckRules.min_misfit;
 }
 
 std::vector<Mistake> MistakesOf(const std::vector<Tried>& tried) {
@@ -283,7 +279,8 @@ void AddFurtherParts(const DiagnosisInput& input, const Mistake& first, ThreadPo
                      ProblemList* problems) {
   DiagnosisInput fixed = input;
   Mistake last = first;
-  for (int further = 2; further <= kMaxParts && last.part && !last.fix.touches.empty(); ++further) {
+  for (int further = 2; further <= kCheckRules.max_parts && last.part && !last.fix.touches.empty();
+       ++further) {
     auto set = std::make_shared<session::MeasurementSet>(*fixed.set);
     if (!session::ApplyFix(last.fix, set.get()).ok()) return;
     set->origin = further == 2 ? kFixedFile : absl::StrCat("fixed", further - 1, ".csv");
@@ -310,7 +307,7 @@ absl::Status LookForMistakes(const DiagnosisInput& input, const DiagnosisContext
   if (best.empty()) best = PartMistakes(trial, before, tried);
   std::optional<MeshUnit> mesh_unit;
   if (best.empty()) mesh_unit = WrongMeshUnit(trial, before);
-  if (best.empty() && !mesh_unit && before.ErrorM({}) >= kMinMisfitM) {
+  if (best.empty() && !mesh_unit && before.ErrorM({}) >= kCheckRules.min_misfit_m) {
     for (Tried& one : TryAll(trial, OffsetOrigins(trial, before), context.pool))
       tried.push_back(std::move(one));
     best = MistakesOf(Convincing(tried, before));
@@ -338,7 +335,7 @@ absl::StatusOr<std::vector<engine::DataProblem>> FindDataProblems(const Diagnosi
   const absl::StatusOr<touches::Observations> o = touches::MakeObservations(input);
   if (!o.ok() || !input.set->has_poses) return none;
   const Trial trial(input, SampleRows(*o));
-  if (static_cast<int>(trial.rows().size()) < kMinTouches) return none;
+  if (static_cast<int>(trial.rows().size()) < kCheckRules.min_touches) return none;
   TOUCHSTONE_RETURN_IF_ERROR(context.Enter("checking the data", 0.01));
   const absl::StatusOr<TrialResult> before = trial.Run({});
   if (!before.ok() || before->objects.empty()) return none;

@@ -2,16 +2,16 @@
 // as it is. A search for effects takes minutes on a file with two columns exchanged, and ends with four to seven
 // effects at their bounds, all of them nonsense.
 //
-// A mistake is claimed only where it must be one:
-// - its fix leaves at most kMaxRatio of the error, on the same touches and with the same model. What it competes with
+// A mistake is claimed only where it must be one (numbers: rules.h):
+// - its fix leaves at most max_ratio of the error, on the same touches and with the same model. What it competes with
 //   is physics that is missing; no fix has a size to adapt (but object origins, see there), so that physics would have
 //   to equal the mistake in every direction at once to be mistaken for it.
 //   24 rigs of strong physics (tests beside this file), six seeds each, made no claim, nor did any public set
 //   without a mistake;
-// - what is left is small against what was measured (kMaxRelative): the fix explains the data rather than that the
+// - what is left is small against what was measured (max_left): the fix explains the data rather than that the
 //   data shrank, as times do that are divided by 1000;
-// - the misfit is a length that counts (kMinMisfitM), and another kind of mistake does not do nearly as well;
-// - a factor of speeds or times is the discrete one, within kScaleTolerance: a slowdown of 0.45 is physics, speeds
+// - the misfit is a length that counts (min_misfit_m), and another kind of mistake does not do nearly as well;
+// - a factor of speeds or times is the discrete one, within scale_tolerance: a slowdown of 0.45 is physics, speeds
 //   doubled are not.
 // Mistakes that make the same file of this object (lateral reversed; outer fingers exchanged) are all named.
 #pragma once

@@ -12,6 +12,7 @@
 #include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/corrupted_test_file.h"
+#include "server/diagnosis/checks/rules.h"
 #include "server/diagnosis/checks/sampled_set.h"
 
 namespace touchstone::diagnosis::checks {
@@ -357,11 +358,11 @@ TEST(SampleRows, TakesEveryObjectItsPosesAndTheWholeSession) {
   const auto o = touches::MakeObservations(input);
   ASSERT_TRUE(o.ok());
   const std::vector<int> rows = SampleRows(*o);
-  EXPECT_NEAR(rows.size(), kSampled, 3);
+  EXPECT_NEAR(rows.size(), kCheckRules.sampled_touches, 3);
   EXPECT_EQ(rows, SampleRows(*o));
   std::vector<int> of_object(3);
   for (const int row : rows) ++of_object[input.set->object[row]];
-  for (const int count : of_object) EXPECT_NEAR(count, kSampled / 3, 1);
+  for (const int count : of_object) EXPECT_NEAR(count, kCheckRules.sampled_touches / 3, 1);
   EXPECT_LT(rows.front(), 30);
   EXPECT_GT(rows.back(), input.set->size() - 30);
 }

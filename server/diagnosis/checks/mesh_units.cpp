@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/diagnosis/checks/object_mistakes.h"
+#include "server/diagnosis/checks/rules.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
@@ -14,9 +15,6 @@ struct KnownUnit {
 };
 constexpr KnownUnit kUnits[] = {{1000, "m"}, {25.4, "inch"}, {10, "cm"},
                                 {1e-3, ""},  {0.1, ""},      {1 / 25.4, ""}};
-
-// Targets lie on the object and leave its edges out: their spread over the object's.
-constexpr double kMinSpread = 0.3, kMaxSpread = 1.5;
 
 // The largest extent of an object's targets over that of its mesh; 0 without touches.
 double SpreadOver(const session::MeasurementSet& set, int object, const geometry::Bounds& bounds) {
@@ -48,9 +46,9 @@ std::optional<MeshUnit> WrongMeshUnit(const Trial& trial, const TrialResult& bef
     for (size_t o = 0; o < objects.size(); ++o) {
       const geometry::Surface& surface = *input.surfaces.at(objects[o]);
       const double spread = SpreadOver(*input.set, static_cast<int>(o), surface.bounds());
-      const bool fits = spread >= kMinSpread && spread <= kMaxSpread;
+      const bool fits = spread >= kCheckRules.min_spread && spread <= kCheckRules.max_spread;
       const double then = spread / unit.factor;
-      if (fits || then < kMinSpread || then > kMaxSpread) continue;
+      if (fits || then < kCheckRules.min_spread || then > kCheckRules.max_spread) continue;
       auto scaled = Scaled(surface, objects[o], unit.factor);
       if (scaled == nullptr) continue;
       found.fixed.surfaces[objects[o]] = std::move(scaled);
@@ -60,8 +58,9 @@ std::optional<MeshUnit> WrongMeshUnit(const Trial& trial, const TrialResult& bef
     const Trial again(found.fixed, trial.rows());
     const absl::StatusOr<TrialResult> after = again.Run({});
     if (!after.ok()) continue;
-    if (after->Relative(found.objects) <= kMaxRelative &&
-        after->Relative(found.objects) <= kMaxRatio * std::min(before.Relative(found.objects), kMaxBefore))
+    if (after->Relative(found.objects) <= kCheckRules.max_left &&
+        after->Relative(found.objects) <=
+            kCheckRules.max_ratio * std::min(before.Relative(found.objects), kCheckRules.max_before.value()))
       return found;
   }
   return std::nullopt;

@@ -8,16 +8,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/diagnosis/checks/rules.h"
 #include "server/model/finger_name.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-// Of more fingers only exchanges of two, turns and the reverse are tried: 120 orders cost as much as all else.
-constexpr int kMaxPermuted = 4;
-// What touching arms do. Outside of it a column of speeds has another unit rather than the times.
-constexpr double kSlowestMS = 0.5e-3, kFastestMS = 0.5;
-constexpr int kMaxShift = 2;  // rows
 
 struct Factor {
   double factor;  // what is in the file times this is right
@@ -29,7 +24,7 @@ std::vector<std::vector<int>> FingerOrders(int fingers) {
   std::iota(order.begin(), order.end(), 0);
   const std::vector<int> right = order;
   std::vector<std::vector<int>> orders;
-  if (fingers <= kMaxPermuted) {
+  if (fingers <= kCheckRules.max_permuted) {
     while (std::next_permutation(order.begin(), order.end())) orders.push_back(order);
     return orders;
   }
@@ -181,7 +176,7 @@ void AddUnitsOfLength(std::vector<Mistake>* mistakes) {
 }
 
 void AddShifts(std::vector<Mistake>* mistakes) {
-  for (int size = 1; size <= kMaxShift; ++size)
+  for (int size = 1; size <= kCheckRules.max_shift; ++size)
     for (const int shift : {size, -size}) {
       Mistake mistake{ProblemKind::kRowShift,
                       absl::StrCat(shift > 0 ? "+" : "", shift, size == 1 ? " row" : " rows"),
@@ -229,7 +224,7 @@ std::vector<Mistake> MistakesOfFiles(int fingers, double typical_speed_m_s) {
   std::vector<Mistake> mistakes;
   AddReversals(&mistakes);
   AddFingerOrders(fingers, &mistakes);
-  if (typical_speed_m_s >= kSlowestMS && typical_speed_m_s <= kFastestMS) {
+  if (typical_speed_m_s >= kCheckRules.slowest_m_s && typical_speed_m_s <= kCheckRules.fastest_m_s) {
     AddUnitsOfTime(&mistakes);
     AddSpeeds(&mistakes);
   } else {

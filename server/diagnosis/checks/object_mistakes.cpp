@@ -8,18 +8,11 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnosis/checks/rules.h"
 #include "server/diagnosis/checks/tried.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-// Ten times what object_pose calls typical (1 mm), twenty times gravity_sag's: below, an object that stands too low is
-// physics, with an effect that says so.
-constexpr double kMinOffsetM = 0.010;
-constexpr double kStepM = 0.005, kFinestM = 0.1e-3;
-constexpr int kMaxSteps = 30;  // each way
-constexpr double kSameOffsetM = 0.002;
-constexpr double kNearWholeM = 0.3e-3;
 
 using Offsets = std::vector<std::pair<std::string, Eigen::Vector3d>>;
 
@@ -30,9 +23,10 @@ double ErrorOf(const TrialResult& result, const std::string& object) {
 
 bool Explains(const TrialResult& before, const TrialResult& after, const std::string& object) {
   const auto found = after.objects.find(object);
-  return found != after.objects.end() && found->second.touches >= kMinTouchesOfObject &&
-         after.Relative({object}) <= kMaxRelative &&
-         after.Relative({object}) <= kMaxRatio * std::min(before.Relative({object}), kMaxBefore);
+  return found != after.objects.end() && found->second.touches >= kCheckRules.min_touches_of_object &&
+         after.Relative({object}) <= kCheckRules.max_left &&
+         after.Relative({object}) <=
+             kCheckRules.max_ratio * std::min(before.Relative({object}), kCheckRules.max_before.value());
 }
 
 // Physics that is missing biases a fitted offset by some tenths of a millimetre, and whoever mounts an object too low
@@ -40,7 +34,8 @@ bool Explains(const TrialResult& before, const TrialResult& after, const std::st
 double Rounded(double offset_m) {
   const auto to_multiple = [offset_m](double step_m) { return std::round(offset_m / step_m) * step_m; };
   const double whole_m = to_multiple(kMetresPerMillimetre);
-  return std::abs(offset_m - whole_m) < kNearWholeM ? whole_m : to_multiple(kFinestM);
+  return std::abs(offset_m - whole_m) < kCheckRules.near_whole_m ? whole_m
+                                                                 : to_multiple(kCheckRules.finest_offset_m);
 }
 
 // The offset along z of each object that leaves least, coarse to fine, all objects at once.
@@ -63,10 +58,10 @@ std::vector<double> BestOffsets(const Trial& trial) {
       if (now < error[o]) error[o] = now, best[o] = offset_m[o];
     }
   };
-  const double step_m = std::max(kStepM, height_m / kMaxSteps);
+  const double step_m = std::max(kCheckRules.offset_step_m.value(), height_m / kCheckRules.max_offset_steps);
   for (double offset_m = 0; offset_m <= height_m; offset_m += step_m)
     for (const double sign : {1.0, -1.0}) look(std::vector<double>(objects.size(), sign * offset_m));
-  for (double half_m = step_m / 2; half_m > kFinestM / 2; half_m /= 2) {
+  for (double half_m = step_m / 2; half_m > kCheckRules.finest_offset_m / 2; half_m /= 2) {
     const std::vector<double> centre = best;
     for (const double sign : {1.0, -1.0}) {
       std::vector<double> offset_m = centre;
@@ -83,7 +78,7 @@ std::vector<Mistake> MisnamedObjects(const Trial& trial, const TrialResult& befo
   const std::vector<std::string>& objects = trial.input().set->objects;
   std::vector<std::string> best = objects;
   std::vector<double> least(objects.size());
-  for (size_t o = 0; o < objects.size(); ++o) least[o] = kMaxRatio * ErrorOf(before, objects[o]);
+  for (size_t o = 0; o < objects.size(); ++o) least[o] = kCheckRules.max_ratio * ErrorOf(before, objects[o]);
   for (const auto& [mesh, surface] : trial.input().surfaces) {
     session::MeasurementFix fix;
     for (const std::string& object : objects)
@@ -141,7 +136,7 @@ std::vector<Mistake> OriginsOfBoundingBox(const Trial& trial) {
       largest_m = std::max(largest_m, anchor_m.norm());
       mistake.fix.move_objects_m.emplace_back(object, -anchor_m);
     }
-    if (largest_m < kMinOffsetM) continue;
+    if (largest_m < kCheckRules.min_offset_m) continue;
     mistake.detail = absl::StrCat(kPlaces[0][at[0]], ", ", kPlaces[1][at[1]], ", ", kPlaces[2][at[2]]);
     mistake.words = absl::StrCat(
         "the targets are told from another origin than the mesh's: from the bounding box's ", mistake.detail);
@@ -162,7 +157,7 @@ std::vector<Mistake> OffsetOrigins(const Trial& trial, const TrialResult& before
   Mistake mistake{ProblemKind::kObjectOrigin, "", "", {}, {}, true};
   double sum_m = 0;
   for (size_t o = 0; o < objects.size(); ++o) {
-    if (std::abs(offset_m[o]) < kMinOffsetM || !Explains(before, *result, objects[o])) continue;
+    if (std::abs(offset_m[o]) < kCheckRules.min_offset_m || !Explains(before, *result, objects[o])) continue;
     mistake.objects.push_back(objects[o]);
     mistake.fix.move_objects_m.push_back(all.move_objects_m[o]);
     sum_m += offset_m[o];
@@ -172,7 +167,7 @@ std::vector<Mistake> OffsetOrigins(const Trial& trial, const TrialResult& before
   const double mean_m = Rounded(sum_m / static_cast<double>(mistake.objects.size()));
   bool alike = true;
   for (const auto& [object, moved_m] : mistake.fix.move_objects_m)
-    alike &= std::abs(moved_m.z() - mean_m) < kSameOffsetM;
+    alike &= std::abs(moved_m.z() - mean_m) < kCheckRules.same_offset_m;
   std::vector<std::string> texts;
   for (auto& [object, moved_m] : mistake.fix.move_objects_m) {
     if (alike) moved_m.z() = mean_m;

@@ -8,19 +8,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/diagnosis/checks/rules.h"
+
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr double kFineM = 0.25e-3;      // errors below it are alike: noise and the physics that is missing
-constexpr double kChangeNats = 1.5;     // of a change between right and wrong from one touch to the next
-constexpr int kMinPart = 8;             // tried touches in the part, and in the rest
-constexpr int kMinRun = 4;              // tried touches between two changes, in the mean
-constexpr double kMaxRestError = 0.35;  // relative: what physics may leave of the rest
-constexpr double kRestWorse = 1.5;      // what the fix makes of the rest's error at least
-constexpr double kSameGain = 0.98;      // of the best gain: as likely
-constexpr int kMinBlock = 10;           // rows of one object, one after the other
-constexpr double kNearlyAll = 0.9;      // of them
-constexpr size_t kMaxRanges = 60, kRangesInWords = 4, kMaxPartsNamed = 3;
 
 using Ranges = std::vector<std::pair<uint64_t, uint64_t>>;
 
@@ -37,7 +28,7 @@ struct Part {
 };
 
 double FineS2(const TrialResult& before) {
-  const double fine_s = kFineM / std::max(before.speed_m_s, 1e-6);
+  const double fine_s = kCheckRules.fine_m / std::max(before.speed_m_s, kCheckRules.min_speed_m_s.value());
   return fine_s * fine_s;
 }
 
@@ -57,7 +48,7 @@ Part Divide(const TrialResult& before, const Candidate& candidate) {
   const size_t rows = before.touches.size();
   const double fine_s2 = FineS2(before), factor = candidate.mistake.fix.scale_times;
   std::vector<std::array<char, 2>> from(rows, {0, 1});
-  std::array<double, 2> cost = {0, kChangeNats};
+  std::array<double, 2> cost = {0, kCheckRules.change_nats.value()};
   double all_right = 0;
   for (size_t row = 0; row < rows; ++row) {
     if (!InScope(before, candidate, row)) continue;
@@ -66,9 +57,9 @@ Part Divide(const TrialResult& before, const Candidate& candidate) {
     all_right += here[0];
     const std::array<double, 2> last = cost;
     for (int state = 0; state < 2; ++state) {
-      const bool changed = last[1 - state] + kChangeNats < last[state];
+      const bool changed = last[1 - state] + kCheckRules.change_nats < last[state];
       from[row][state] = static_cast<char>(changed ? 1 - state : state);
-      cost[state] = here[state] + (changed ? last[1 - state] + kChangeNats : last[state]);
+      cost[state] = here[state] + (changed ? last[1 - state] + kCheckRules.change_nats : last[state]);
     }
   }
   Part part;
@@ -93,9 +84,9 @@ void RoundToBlocks(const session::MeasurementSet& set, Part* part) {
     for (end = begin; end < set.size() && set.object[end] == set.object[begin];) ++end;
     const auto first = part->wrong.begin() + begin, last = part->wrong.begin() + end;
     const auto wrong = std::count(first, last, 1);
-    if (end - begin < kMinBlock || wrong == 0) continue;
-    if (wrong >= kNearlyAll * (end - begin)) std::fill(first, last, 1);
-    if (wrong <= (1 - kNearlyAll) * (end - begin)) std::fill(first, last, 0);
+    if (end - begin < kCheckRules.min_block || wrong == 0) continue;
+    if (wrong >= kCheckRules.nearly_all * (end - begin)) std::fill(first, last, 1);
+    if (wrong <= (1 - kCheckRules.nearly_all) * (end - begin)) std::fill(first, last, 0);
   }
   part->count = static_cast<int>(std::count(part->wrong.begin(), part->wrong.end(), 1));
 }
@@ -128,21 +119,22 @@ bool PartIsClaimable(const TrialResult& before, const Candidate& candidate, cons
       others.push_back(*before.touches[row]);
     }
   }
-  if (static_cast<int>(part_before.size()) < kMinPart ||
-      static_cast<int>(rest_before.size() + others.size()) < kMinPart || part.runs * kMinRun > part.count ||
-      !ScaleOfPartIsRight(candidate.mistake, part_after))
+  if (static_cast<int>(part_before.size()) < kCheckRules.min_part ||
+      static_cast<int>(rest_before.size() + others.size()) < kCheckRules.min_part ||
+      part.runs * kCheckRules.min_run > part.count || !ScaleOfPartIsRight(candidate.mistake, part_after))
     return false;
   const ObjectError was = RobustError(part_before), is = RobustError(part_after);
   const double misfit_m = std::sqrt(was.error_s2) * before.speed_m_s;
-  if (!ChangesScale(candidate.mistake) && misfit_m < kMinMisfitM) return false;
-  if (RelativeOf(is) > kMaxRelative || RelativeOf(is) > kMaxRatio * std::min(RelativeOf(was), kMaxBefore))
+  if (!ChangesScale(candidate.mistake) && misfit_m < kCheckRules.min_misfit_m) return false;
+  if (RelativeOf(is) > kCheckRules.max_left ||
+      RelativeOf(is) > kCheckRules.max_ratio * std::min(RelativeOf(was), kCheckRules.max_before.value()))
     return false;
   // Where the touches of the same object are right as they stand, the fix must make them worse.
-  if (static_cast<int>(rest_before.size()) >= kMinPart &&
-      RelativeOf(RobustError(rest_after)) < kRestWorse * RelativeOf(RobustError(rest_before)))
+  if (static_cast<int>(rest_before.size()) >= kCheckRules.min_part &&
+      RelativeOf(RobustError(rest_after)) < kCheckRules.rest_worse * RelativeOf(RobustError(rest_before)))
     return false;
   rest_before.insert(rest_before.end(), others.begin(), others.end());
-  return RelativeOf(RobustError(rest_before)) <= kMaxRestError;
+  return RelativeOf(RobustError(rest_before)) <= kCheckRules.max_rest_error;
 }
 
 // The touches of these rows as ranges of their numbers, none of which holds another touch.
@@ -162,11 +154,12 @@ Ranges RangesOf(const session::MeasurementSet& set, const std::vector<char>& wro
 
 std::string InWords(const Ranges& ranges) {
   std::vector<std::string> texts;
-  for (size_t r = 0; r < std::min(ranges.size(), kRangesInWords); ++r)
+  for (size_t r = 0; r < std::min(ranges.size(), kCheckRules.ranges_in_words.value()); ++r)
     texts.push_back(ranges[r].first == ranges[r].second
                         ? absl::StrCat(ranges[r].first)
                         : absl::StrCat(ranges[r].first, " to ", ranges[r].second));
-  return absl::StrCat("touches ", absl::StrJoin(texts, ", "), ranges.size() > kRangesInWords ? ", ..." : "");
+  return absl::StrCat("touches ", absl::StrJoin(texts, ", "),
+                      ranges.size() > kCheckRules.ranges_in_words ? ", ..." : "");
 }
 
 // Mistakes of whole files, and each object under the name of each other mesh.
@@ -223,7 +216,7 @@ bool Complete(const Trial& trial, Candidate candidate, Mistake* mistake) {
   *mistake = candidate.mistake;
   mistake->part = true;
   const Ranges ranges = RangesOf(set, part.wrong);
-  if (ranges.size() <= kMaxRanges) mistake->fix.touches = ranges;
+  if (ranges.size() <= kCheckRules.max_ranges) mistake->fix.touches = ranges;
   int of = set.size();
   const auto& renames = candidate.mistake.fix.rename_objects;
   if (candidate.object >= 0)
@@ -246,7 +239,7 @@ void ConfineTo(const session::MeasurementSet& set, const std::vector<int>& rows,
   for (const int row : rows) wrong[row] = 1;
   mistake->part = true;
   const Ranges ranges = RangesOf(set, wrong);
-  if (ranges.size() <= kMaxRanges) mistake->fix.touches = ranges;
+  if (ranges.size() <= kCheckRules.max_ranges) mistake->fix.touches = ranges;
   absl::StrAppend(&mistake->detail, ", ", InWords(ranges));
   absl::StrAppend(&mistake->words, " in ", rows.size(), " of the ", set.size(), " touches alone (",
                   InWords(ranges), ")");
@@ -254,7 +247,7 @@ void ConfineTo(const session::MeasurementSet& set, const std::vector<int>& rows,
 
 std::vector<Mistake> MistakesOfRows(const Trial& trial, ThreadPool* pool) {
   const absl::StatusOr<TrialResult> before = trial.Run({});
-  if (!before.ok() || static_cast<int>(trial.rows().size()) < kMinPart) return {};
+  if (!before.ok() || static_cast<int>(trial.rows().size()) < kCheckRules.min_part) return {};
   std::vector<Mistake> found;
   for (Tried& one : Convincing(TryAll(trial, AllMistakes(trial, *before), pool), *before)) {
     ConfineTo(*trial.input().set, trial.rows(), &one.mistake);
@@ -265,23 +258,25 @@ std::vector<Mistake> MistakesOfRows(const Trial& trial, ThreadPool* pool) {
 
 std::vector<Mistake> PartMistakes(const Trial& trial, const TrialResult& before,
                                   const std::vector<Tried>& tried) {
-  const double coarse_s = kMinMisfitM / std::max(before.speed_m_s, 1e-6);
+  const double coarse_s =
+      kCheckRules.min_misfit_m / std::max(before.speed_m_s, kCheckRules.min_speed_m_s.value());
   const auto wrong = std::count_if(before.touches.begin(), before.touches.end(), [&](const auto& touch) {
     return touch && touch->error_s2 > coarse_s * coarse_s;
   });
-  if (wrong < kMinPart) return {};
+  if (wrong < kCheckRules.min_part) return {};
   std::vector<Tried> renamed;
   std::vector<std::pair<double, Candidate>> claimable;
   for (const Candidate& candidate : Candidates(trial, tried, &renamed)) {
     const Part part = Divide(before, candidate);
-    if (part.count < kMinPart || !PartIsClaimable(before, candidate, part)) continue;
+    if (part.count < kCheckRules.min_part || !PartIsClaimable(before, candidate, part)) continue;
     claimable.emplace_back(part.gain_nats, candidate);
   }
   std::stable_sort(claimable.begin(), claimable.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<Mistake> found;
   for (const auto& [gain_nats, candidate] : claimable) {
-    if (gain_nats < kSameGain * claimable[0].first || found.size() == kMaxPartsNamed) break;
+    if (gain_nats < kCheckRules.same_gain * claimable[0].first || found.size() == kCheckRules.max_named)
+      break;
     const bool again = std::any_of(found.begin(), found.end(),
                                    [kind = candidate.mistake.kind](const auto& m) { return m.kind == kind; });
     Mistake mistake;

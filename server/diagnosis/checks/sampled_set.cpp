@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "server/diagnosis/checks/rules.h"
+
 namespace touchstone::diagnosis::checks {
 
 std::vector<int> SampleRows(const touches::Observations& o) {
@@ -17,7 +19,8 @@ std::vector<int> SampleRows(const touches::Observations& o) {
     if (is_new) of_object.emplace_back();
     of_object[found->second].push_back(k);
   }
-  const int quota = std::max<int>(kMinPerObject, kSampled / std::max<size_t>(o.objects.size(), 1));
+  const int quota = std::max<int>(kCheckRules.min_sampled_of_object,
+                                  kCheckRules.sampled_touches / std::max<size_t>(o.objects.size(), 1));
   std::vector<int> rows;
   for (const auto& of_object : poses) {
     // Poses spread evenly, and of each another repeat than of the one before; then further repeats.

@@ -8,11 +8,6 @@
 
 namespace touchstone::diagnosis::checks {
 
-// About so many touches are enough: with 160 the right mistake came first in 5 of 5 sets, at a fiftieth of the error,
-// and the next one at 0.38. Sets of many objects take at least kMinPerObject of each.
-inline constexpr int kSampled = 160;
-inline constexpr int kMinPerObject = 8;
-
 // Rows of the set, ascending; touches that are not used have no part. The same observations give the same rows.
 std::vector<int> SampleRows(const touches::Observations& observations);
 

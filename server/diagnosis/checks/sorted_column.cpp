@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/checks/rules.h"
 #include "server/diagnosis/touches/prediction.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr int kMinDistinct = 10;  // steps that all go one way: by chance once in a thousand times at the most
-constexpr double kMinUpAndDown =
-    0.15;  // share of the rows that go against the column's direction in the model
 
 // Values of one finger in the order of the file: how many steps go up and how many down.
 struct Steps {
@@ -37,7 +34,9 @@ int SortedColumn(const DiagnosisInput& input) {
     std::vector<double> column(set.size());
     for (int row = 0; row < set.size(); ++row) column[row] = set.TimeS(row, finger);
     const Steps measured = StepsOf(column);
-    if (std::min(measured.up, measured.down) > 0 || measured.up + measured.down < kMinDistinct) continue;
+    if (std::min(measured.up, measured.down) > 0 ||
+        measured.up + measured.down < kCheckRules.min_distinct_steps)
+      continue;
     const absl::StatusOr<touches::Observations> o = touches::MakeObservations(input);
     if (!o.ok()) return -1;
     const absl::StatusOr<touches::Prediction> predicted =
@@ -53,7 +52,7 @@ int SortedColumn(const DiagnosisInput& input) {
       if (!std::isnan(column[o->row[k]])) expected[o->row[k]] = times_s[finger] - first_s;
     }
     const Steps model = StepsOf(expected);
-    if (std::min(model.up, model.down) > kMinUpAndDown * (model.up + model.down)) return finger;
+    if (std::min(model.up, model.down) > kCheckRules.min_up_and_down * (model.up + model.down)) return finger;
   }
   return -1;
 }

@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/checks/rules.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/touches/predictor.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr double kCounted = 0.7;  // share of the touches
 
 // A finger that reported and that the model lets miss: nothing is explained.
 bool ErrorOf(const touches::Observations& o, const touches::Prediction& predicted, int k, TouchError* error) {
@@ -48,7 +47,7 @@ double Median(std::vector<double> values) {
 
 template <typename Field>
 double MeanOfBest(std::vector<TouchError>* errors, Field field) {
-  const size_t counted = std::max<size_t>(1, std::llround(kCounted * errors->size()));
+  const size_t counted = std::max<size_t>(1, std::llround(kCheckRules.counted_share * errors->size()));
   std::sort(errors->begin(), errors->end(),
             [&](const TouchError& a, const TouchError& b) { return a.*field < b.*field; });
   double sum = 0;
@@ -121,7 +120,7 @@ absl::StatusOr<TrialResult> Trial::Run(const session::MeasurementFix& fix) const
     total.touches = static_cast<int>(errors.size());
     total.spread_s2 = MeanOfBest(&errors, &TouchError::spread_s2);
     total.error_s2 = MeanOfBest(&errors, &TouchError::error_s2);
-    const size_t counted = std::max<size_t>(1, std::llround(kCounted * errors.size()));
+    const size_t counted = std::max<size_t>(1, std::llround(kCheckRules.counted_share * errors.size()));
     for (size_t t = 0; t < counted; ++t) {
       product += errors[t].product_s2;
       square += errors[t].predicted_s2;

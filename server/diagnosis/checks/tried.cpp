@@ -5,26 +5,24 @@
 #include <optional>
 
 #include "server/diagnosis/checks/object_mistakes.h"
+#include "server/diagnosis/checks/rules.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
 
-constexpr double kScaleTolerance = 0.02;    // physics that is missing biases the factor by about a hundredth
-constexpr double kFarScaleTolerance = 0.2;  // of factors of ten on, which no physics comes near
-constexpr double kTie = 1.1;                // errors within this factor are the same
-constexpr size_t kMaxNamed = 3;
-
 double RatioOf(const Tried& tried, const TrialResult& before) {
   const std::vector<std::string>& names = tried.mistake.objects;
-  const double was = std::min(before.Relative(names), kMaxBefore);
+  const double was = std::min(before.Relative(names), kCheckRules.max_before.value());
   return was > 0 ? tried.after.Relative(names) / was : 1;
 }
 
 bool Claimable(const Tried& tried, const TrialResult& before) {
   const std::vector<std::string>& names = tried.mistake.objects;
-  if (!(RatioOf(tried, before) <= kMaxRatio) || !(tried.after.Relative(names) <= kMaxRelative)) return false;
+  if (!(RatioOf(tried, before) <= kCheckRules.max_ratio) ||
+      !(tried.after.Relative(names) <= kCheckRules.max_left))
+    return false;
   if (!ScaleIsRight(tried.mistake, tried.after.scale, tried.after.scale_error)) return false;
-  return ChangesScale(tried.mistake) || before.ErrorM(names) >= kMinMisfitM;
+  return ChangesScale(tried.mistake) || before.ErrorM(names) >= kCheckRules.min_misfit_m;
 }
 
 }  // namespace
@@ -33,7 +31,9 @@ bool ScaleIsRight(const Mistake& mistake, double scale, double scale_error) {
   const double factor = mistake.fix.scale_times * mistake.fix.scale_speed;
   if (factor == 1) return true;
   const bool far = factor > 9 || factor < 1 / 9.0;
-  return std::abs(scale - 1) <= (far ? kFarScaleTolerance : kScaleTolerance) + 3 * scale_error;
+  return std::abs(scale - 1) <=
+         (far ? kCheckRules.far_scale_tolerance.value() : kCheckRules.scale_tolerance.value()) +
+             3 * scale_error;
 }
 
 bool ChangesScale(const Mistake& mistake) {
@@ -51,17 +51,18 @@ std::vector<Tried> Convincing(const std::vector<Tried>& tried, const TrialResult
                        [&](const Tried& other) { return other.mistake.kind == one.mistake.kind; });
   };
   for (const Tried& one : tried)
-    if (one.relative <= kTie * least->relative && Claimable(one, before)) best.push_back(one);
+    if (one.relative <= kCheckRules.tie * least->relative && Claimable(one, before)) best.push_back(one);
   for (const Tried& one : tried)
-    if (one.relative > kTie * least->relative && !same_kind(one)) next = std::min(next, one.relative);
-  if (RatioOf(*least, before) > kSure && next < kClear * least->relative) return {};
+    if (one.relative > kCheckRules.tie * least->relative && !same_kind(one))
+      next = std::min(next, one.relative);
+  if (RatioOf(*least, before) > kCheckRules.sure && next < kCheckRules.clear * least->relative) return {};
   // Of one kind one is enough, the simplest; and a tie with a fitted size is no tie.
   std::vector<Tried> named;
   for (const Tried& one : best) {
     const bool again = std::any_of(named.begin(), named.end(), [&](const Tried& other) {
       return other.mistake.kind == one.mistake.kind;
     });
-    if (!again && named.size() < kMaxNamed && !(one.mistake.free_size && !named.empty()))
+    if (!again && named.size() < kCheckRules.max_named && !(one.mistake.free_size && !named.empty()))
       named.push_back(one);
   }
   return named;

@@ -8,15 +8,6 @@
 
 namespace touchstone::diagnosis::checks {
 
-// What a claim leaves of the error and of the data at most, and what the misfit is at least.
-inline constexpr double kMaxRatio = 0.2;
-inline constexpr double kMaxRelative = 0.25;
-inline constexpr double kMaxBefore =
-    2;  // what nonsense leaves, relative to the data: uncorrelated sqrt(2), reversed 2
-inline constexpr double kMinMisfitM = 0.5e-3;
-inline constexpr double kClear = 1.5;  // the next other kind is worse by this, unless kSure
-inline constexpr double kSure = 0.05;  // ratio of errors
-
 struct Tried {
   Mistake mistake;
   TrialResult after;

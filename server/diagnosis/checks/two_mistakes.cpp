@@ -4,12 +4,10 @@
 #include <memory>
 
 #include "server/diagnosis/checks/mistakes.h"
+#include "server/diagnosis/checks/rules.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr double kMinBefore = 0.5;  // relative error from which a pair is looked for
-constexpr double kStricter = 0.5;   // than for one mistake: of the ratio and of what is left
 
 // What may stand beside any other mistake: columns, directions and units are mistakes of the program that wrote the
 // file, the rest of whoever measured.
@@ -22,7 +20,7 @@ bool IsOfTheProgram(const Mistake& mistake) {
 
 std::vector<Mistake> TwoMistakes(const DiagnosisInput& input, const std::vector<int>& rows,
                                  const TrialResult& before, ThreadPool* pool) {
-  if (before.Relative({}) < kMinBefore) return {};
+  if (before.Relative({}) < kCheckRules.min_before_pair) return {};
   std::vector<Mistake> best;
   double least = INFINITY;
   for (const Mistake& first : MistakesOfFiles(input.set->fingers, before.speed_m_s)) {
@@ -40,8 +38,9 @@ std::vector<Mistake> TwoMistakes(const DiagnosisInput& input, const std::vector<
       mistakes.erase(std::remove_if(mistakes.begin(), mistakes.end(), ChangesScale), mistakes.end());
     const std::vector<Tried> pairs = Convincing(TryAll(trial, mistakes, pool), *now);
     if (pairs.empty() || !(pairs[0].relative < least)) continue;
-    const double was = std::min(before.Relative({}), kMaxBefore);
-    if (pairs[0].relative > kStricter * kMaxRelative || pairs[0].relative > kStricter * kMaxRatio * was)
+    const double was = std::min(before.Relative({}), kCheckRules.max_before.value());
+    if (pairs[0].relative > kCheckRules.pair_stricter * kCheckRules.max_left ||
+        pairs[0].relative > kCheckRules.pair_stricter * kCheckRules.max_ratio * was)
       continue;
     // The scale of both together must be the discrete one.
     Mistake both = first;

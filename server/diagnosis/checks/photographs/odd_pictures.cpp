@@ -8,20 +8,12 @@
 #include <numeric>
 #include <set>
 
+#include "server/diagnosis/checks/photographs/rules.h"
+
 namespace touchstone::diagnosis::checks {
 namespace {
 
 using Mirror = session::ImageSetFix::Mirror;
-
-constexpr int kMinAll = 8;              // pictures that say what is odd
-constexpr double kMaxOddShare = 0.1;    // of the pictures; two may be odd in any case
-constexpr double kMaxMedian = 0.1;      // left of the others: the model explains them
-constexpr double kMinOddLeft = 0.12;    // left of an odd picture, at least,
-constexpr double kMinOddRatio = 8;      // ... and over the median
-constexpr double kFixedRatio = 0.3;     // left by a fix, over what was left
-constexpr double kLikeOthers = 3;       // ... or over the median
-constexpr double kMaxStaleShare = 0.4;  // of the pictures: the others say what is odd
-constexpr int kMaxStaleRows = 3;        // that a view may have stood still
 
 std::string ImagesInWords(const std::vector<uint64_t>& images) {
   return absl::StrCat(images.size() == 1 ? "image " : "images ", absl::StrJoin(images, ", "));
@@ -35,18 +27,21 @@ class OddSearch {
     std::vector<int> all(trial_.size());
     std::iota(all.begin(), all.end(), 0);
     const std::vector<TrialPicture> pictures = trial_.RunOn(all, {}, nullptr);
-    if (pictures.size() < kMinAll) return {};
+    if (pictures.size() < kPhotoCheckRules.min_all) return {};
     std::vector<double> left;
     for (const TrialPicture& picture : pictures) left.push_back(picture.left);
     std::nth_element(left.begin(), left.begin() + static_cast<long>(left.size() / 2), left.end());
     median_ = left[left.size() / 2];
-    if (median_ > kMaxMedian) return {};
+    if (median_ > kPhotoCheckRules.max_median) return {};
     for (const TrialPicture& picture : pictures)
-      if (picture.left > std::max(kMinOddLeft, kMinOddRatio * median_)) odd_.push_back(picture);
-    if (odd_.empty() || odd_.size() > kMaxStaleShare * pictures.size()) return {};
+      if (picture.left >
+          std::max(kPhotoCheckRules.min_odd_left.value(), kPhotoCheckRules.min_odd_ratio * median_))
+        odd_.push_back(picture);
+    if (odd_.empty() || odd_.size() > kPhotoCheckRules.max_stale_share * pictures.size()) return {};
     TryStale();
     const std::vector<TrialPicture> left_over = NotFixed();
-    if (left_over.size() > std::max<size_t>(2, static_cast<size_t>(kMaxOddShare * pictures.size())))
+    if (left_over.size() >
+        std::max<size_t>(2, static_cast<size_t>(kPhotoCheckRules.max_odd_share * pictures.size())))
       return std::move(found_);
     TryExchanges();
     TryAlone();
@@ -59,7 +54,8 @@ class OddSearch {
   uint64_t ImageOf(const TrialPicture& picture) const { return set_.photographs[picture.row].image; }
 
   bool IsFixed(double before, double after) const {
-    return after < std::max(kLikeOthers * median_, kFixedRatio * before) && after < before;
+    return after < std::max(kPhotoCheckRules.like_others * median_, kPhotoCheckRules.fixed_ratio * before) &&
+           after < before;
   }
 
   std::vector<TrialPicture> NotFixed() const {
@@ -78,12 +74,12 @@ class OddSearch {
     OddPictures found{{}, 0, 0};
     for (const TrialPicture& picture : odd_) {
       int shown = picture.row - 1;
-      while (shown >= 0 && is_odd(shown) && picture.row - shown < kMaxStaleRows) --shown;
+      while (shown >= 0 && is_odd(shown) && picture.row - shown < kPhotoCheckRules.max_stale_rows) --shown;
       if (shown < 0 || is_odd(shown)) continue;
       session::ImageSetFix at_shown;  // this picture in that row
       at_shown.exchange = {ImageOf(picture), set_.photographs[shown].image};
       const std::vector<TrialPicture> after = trial_.RunOn({shown}, at_shown, nullptr);
-      if (after.size() != 1 || after[0].left > kFixedRatio * picture.left) continue;
+      if (after.size() != 1 || after[0].left > kPhotoCheckRules.fixed_ratio * picture.left) continue;
       stale.push_back(picture);
       fixed_.insert(picture.row);
       found.after += after[0].left;

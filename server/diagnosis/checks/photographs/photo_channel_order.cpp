@@ -4,15 +4,10 @@
 
 #include <cmath>
 
+#include "server/diagnosis/checks/photographs/rules.h"
+
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr int kDark = 24, kBright = 250;  // grey levels between which a pixel tells its colour
-constexpr int kMinPixels = 50;
-constexpr double kMinTint = 0.05;         // mean log(red / blue) that is a colour
-constexpr double kMaxTintSpread = 0.5;    // of the tints of one order, relative to their mean
-constexpr int kMinPicturesOfOrder = 2;    // pictures of either order
-constexpr size_t kMaxPictureRanges = 24;  // that a command can list
 
 // Mean log(red / blue) of what is neither dark nor clipped; NaN: grey, or too little of it.
 double Tint(const session::PhotographRow& row) {
@@ -21,11 +16,11 @@ double Tint(const session::PhotographRow& row) {
   int count = 0;
   for (size_t at = 0; at + 2 < row.pixels.size(); at += 3) {
     const int r = row.pixels[at], b = row.pixels[at + 2];
-    if (std::min(r, b) < kDark || std::max(r, b) > kBright) continue;
+    if (std::min(r, b) < kPhotoCheckRules.dark || std::max(r, b) > kPhotoCheckRules.bright) continue;
     sum += std::log(static_cast<double>(r) / b);
     ++count;
   }
-  return count < kMinPixels ? NAN : sum / count;
+  return count < kPhotoCheckRules.min_pixels ? NAN : sum / count;
 }
 
 // Mean size of the tints of one sign; NaN where they are no one colour.
@@ -36,9 +31,9 @@ double TintOf(const std::vector<double>& tints, bool red) {
     if (std::isnan(tint) || (tint > 0) != red) continue;
     sum += std::abs(tint), squares += tint * tint, ++count;
   }
-  if (count < kMinPicturesOfOrder) return NAN;
+  if (count < kPhotoCheckRules.min_pictures_of_order) return NAN;
   const double mean = sum / count, spread = std::sqrt(std::max(0.0, squares / count - mean * mean));
-  return mean >= kMinTint && spread <= kMaxTintSpread * mean ? mean : NAN;
+  return mean >= kPhotoCheckRules.min_tint && spread <= kPhotoCheckRules.max_tint_spread * mean ? mean : NAN;
 }
 
 }  // namespace
@@ -67,7 +62,7 @@ std::optional<CandidateMistake> MixedChannelOrder(const session::ImageSet& set) 
     else
       ranges.emplace_back(image, image);
   }
-  if (mistake.fix.images.size() > kMaxPictureRanges) return std::nullopt;
+  if (mistake.fix.images.size() > kPhotoCheckRules.max_ranges) return std::nullopt;
   mistake.detail = absl::StrCat(std::min(reddish, bluish), " of ", set.size(), " pictures");
   mistake.words = absl::StrCat(std::min(reddish, bluish), " of the ", set.size(),
                                " pictures have red and blue the other way round than the others (RGB and BGR "

@@ -12,17 +12,10 @@
 #include "server/diagnosis/checks/photographs/photo_channel_order.h"
 #include "server/diagnosis/checks/photographs/photo_mistake_list.h"
 #include "server/diagnosis/checks/photographs/photo_trial.h"
+#include "server/diagnosis/checks/photographs/rules.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr int kMinPictures = 6;
-constexpr int kMinOfObject = 3;         // pictures of an object that says something of its own
-constexpr double kMinLeft = 0.04;       // what must be unexplained for a mistake to be looked for
-constexpr double kMaxPhotoRatio = 0.4;  // of what is left after a fix, to what was before
-constexpr double kMaxLeft = 0.3;        // what a fix leaves at most
-constexpr double kMinAgreement = 0.75;  // share of the pictures that a fix helps
-constexpr double kAlike = 1.6;          // another kind leaves this much more, or it is named beside
 
 struct TriedMistake {
   CandidateMistake mistake;
@@ -51,8 +44,9 @@ bool Convinces(const std::vector<TrialPicture>& before, const std::vector<TrialP
   tried->ratio = tried->before > 0 ? tried->after / tried->before : 1;
   int helped = 0;
   for (size_t k = 0; k < before.size(); ++k) helped += after[k].left < before[k].left;
-  return tried->before >= kMinLeft && tried->after <= kMaxLeft && tried->ratio <= max_ratio &&
-         helped >= kMinAgreement * before.size() && MeanIou(after) > MeanIou(before);
+  return tried->before >= kPhotoCheckRules.min_left && tried->after <= kPhotoCheckRules.max_left &&
+         tried->ratio <= max_ratio && helped >= kPhotoCheckRules.min_agreement * before.size() &&
+         MeanIou(after) > MeanIou(before);
 }
 
 class MistakeSearch {
@@ -62,7 +56,7 @@ class MistakeSearch {
 
   std::vector<PhotoMistake> Find() {
     std::vector<PhotoMistake> found;
-    if (before_.size() >= kMinPictures) {
+    if (before_.size() >= kPhotoCheckRules.min_pictures) {
       for (const CandidateMistake& mistake : MistakesOfSets(*input_.images)) Try(mistake);
       for (const CandidateMistake& mistake : MistakesOfModels(*input_.model)) Try(mistake);
       TryObjects();
@@ -85,10 +79,10 @@ class MistakeSearch {
  private:
   void Try(const CandidateMistake& mistake) {
     const std::vector<TrialPicture> after = trial_.Run(mistake.fix, mistake.model.get(), -1);
-    if (after.size() < kMinPictures) return;
+    if (after.size() < kPhotoCheckRules.min_pictures) return;
     TriedMistake tried{mistake};
-    if (Convinces(Same(before_, after), after, mistake.max_ratio > 0 ? mistake.max_ratio : kMaxPhotoRatio,
-                  &tried))
+    if (Convinces(Same(before_, after), after,
+                  mistake.max_ratio > 0 ? mistake.max_ratio : kPhotoCheckRules.max_ratio.value(), &tried))
       convincing_.push_back(tried);
   }
 
@@ -101,14 +95,16 @@ class MistakeSearch {
       std::vector<TrialPicture> before;
       for (const TrialPicture& picture : before_)
         if (picture.object == static_cast<int>(object)) before.push_back(picture);
-      if (before.size() < kMinOfObject || RobustLeft(before) < kMinLeft) continue;
+      if (before.size() < kPhotoCheckRules.min_of_object || RobustLeft(before) < kPhotoCheckRules.min_left)
+        continue;
       for (const auto& [other, surface] : input_.surfaces) {
         if (other == names[object]) continue;
         TriedMistake tried;
         tried.mistake.fix.rename_objects = {{names[object], other}};
         const std::vector<TrialPicture> after =
             trial_.Run(tried.mistake.fix, nullptr, static_cast<int>(object));
-        if (after.size() != before.size() || !Convinces(before, after, kMaxPhotoRatio, &tried)) continue;
+        if (after.size() != before.size() || !Convinces(before, after, kPhotoCheckRules.max_ratio, &tried))
+          continue;
         if (right.count(names[object]) > 0 && how[names[object]].after <= tried.after) continue;
         right[names[object]] = other;
         how[names[object]] = tried;
@@ -143,7 +139,7 @@ class MistakeSearch {
     for (const TriedMistake& tried : convincing_) {
       const bool of_object = !tried.mistake.fix.rename_objects.empty();
       if (of_object != objects) continue;
-      if (!objects && tried.after > kAlike * least + 1e-4) continue;
+      if (!objects && tried.after > kPhotoCheckRules.alike * least + 1e-4) continue;
       best.push_back(Told(tried, best.empty() || objects));
     }
     // Likelier mistakes stand first in the list; those that fit alike are told in that order.

@@ -4,10 +4,10 @@
 // What a trial measures is the part of a picture's variation that the expected picture does not explain, whatever the
 // gain and offset between the two: 1 - r^2, r the correlation of their grey levels. Light, exposure and the sensor change
 // r little; a picture that is mirrored, or of another object, has no correlation with what is expected. A mistake is
-// claimed only where it must be one:
-// - its fix leaves at most kMaxPhotoRatio of that part, and little of it (kMaxLeft); physics that is missing would have to equal
+// claimed only where it must be one (numbers: rules.h):
+// - its fix leaves at most max_ratio of that part, and little of it (max_left); physics that is missing would have to equal
 //   the mistake in every picture at once;
-// - most of the pictures agree (kMinAgreement), and the outlines fit better than before;
+// - most of the pictures agree (min_agreement), and the outlines fit better than before;
 // - no other kind of mistake does nearly as well; those that make the same set (turned by 180 deg; up reversed) are all
 //   named.
 // Grey pictures cannot show exchanged channels, and a model of white objects says nothing of colour: channels are only

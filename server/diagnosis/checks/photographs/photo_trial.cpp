@@ -4,15 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "server/diagnosis/checks/photographs/rules.h"
+#include "server/diagnosis/checks/rules.h"
 #include "server/image/photograph/simulate_photo.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr int kSide = 64;          // px that the longer side shrinks to, about
-constexpr size_t kMaxSmall = 600;  // pictures that are made smaller
-constexpr int kMaxCompared = 30;   // pictures of a trial
-constexpr double kCounts = 0.7;    // share of the pictures that counts
 
 // Means of squares of shrink x shrink pixels; what does not fill one is cut off.
 session::PhotographRow Small(const session::PhotographRow& row, int width, int height, int shrink) {
@@ -37,7 +34,8 @@ std::vector<int> Chosen(const session::ImageSet& set) {
   std::vector<std::vector<int>> of_object(set.objects.size());
   for (size_t row = 0; row < set.size(); ++row)
     of_object[set.photographs[row].object].push_back(static_cast<int>(row));
-  const int each = std::max<int>(4, kMaxCompared / std::max<int>(1, static_cast<int>(set.objects.size())));
+  const int each = std::max<int>(
+      4, kPhotoCheckRules.max_compared / std::max<int>(1, static_cast<int>(set.objects.size())));
   std::vector<int> rows;
   for (const std::vector<int>& all : of_object) {
     const int count = std::min<int>(each, static_cast<int>(all.size()));
@@ -132,12 +130,12 @@ PhotoTrial::PhotoTrial(const DiagnosisInput& input, ThreadPool* pool) : input_(i
   small_.origin = set.origin;
   small_.objects = set.objects;
   small_.camera = set.camera;
-  shrink_ = std::max(1, std::max(set.camera.width_px, set.camera.height_px) / kSide);
+  shrink_ = std::max(1, std::max(set.camera.width_px, set.camera.height_px) / kPhotoCheckRules.small_side);
   small_.camera.width_px /= shrink_, small_.camera.height_px /= shrink_;
   for (double* length :
        {&small_.camera.fx_px, &small_.camera.fy_px, &small_.camera.cx_px, &small_.camera.cy_px})
     *length /= shrink_;
-  for (size_t row = 0; row < std::min(set.size(), kMaxSmall); ++row)
+  for (size_t row = 0; row < std::min(set.size(), kPhotoCheckRules.max_small.value()); ++row)
     small_.photographs.push_back(
         Small(set.photographs[row], set.camera.width_px, set.camera.height_px, shrink_));
   rows_ = Chosen(small_);
@@ -192,7 +190,8 @@ double RobustLeft(std::vector<TrialPicture> pictures) {
   if (pictures.empty()) return 1;
   std::sort(pictures.begin(), pictures.end(),
             [](const TrialPicture& a, const TrialPicture& b) { return a.left < b.left; });
-  const size_t counts = std::max<size_t>(1, static_cast<size_t>(kCounts * pictures.size() + 0.5));
+  const size_t counts =
+      std::max<size_t>(1, static_cast<size_t>(kCheckRules.counted_share * pictures.size() + 0.5));
   double sum = 0;
   for (size_t k = 0; k < counts; ++k) sum += pictures[k].left;
   return sum / counts;

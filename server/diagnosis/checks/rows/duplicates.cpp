@@ -4,16 +4,11 @@
 #include <cmath>
 #include <vector>
 
+#include "server/diagnosis/checks/rows/rules.h"
 #include "server/diagnosis/touches/noise/ticks.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr double kMinShare = 0.02;  // of the rows
-constexpr int kMinCopies = 3;
-constexpr double kOverChance = 10;
-constexpr double kMinFreedom = 20;  // of the scatter among repeats that differ
-constexpr double kFinestTickS = 1e-8;
 
 // The smallest step between times of the file.
 double ResolutionS(const session::MeasurementSet& set) {
@@ -23,7 +18,8 @@ double ResolutionS(const session::MeasurementSet& set) {
   std::sort(times.begin(), times.end());
   double tick_s = INFINITY;
   for (size_t i = 1; i < times.size(); ++i)
-    if (times[i] - times[i - 1] > kFinestTickS) tick_s = std::min(tick_s, times[i] - times[i - 1]);
+    if (times[i] - times[i - 1] > kRowCheckRules.finest_tick_s)
+      tick_s = std::min(tick_s, times[i] - times[i - 1]);
   return std::isfinite(tick_s) ? tick_s : 0;
 }
 
@@ -71,7 +67,9 @@ Duplicates FindDuplicates(const touches::Observations& o, const model::Model& mo
     copies.push_back(row);
     equal_session_times &= set.session_time_s[row] == set.session_time_s[*same];
   }
-  if (static_cast<double>(copies.size()) < std::max<double>(kMinCopies, kMinShare * set.size())) return {};
+  if (static_cast<double>(copies.size()) <
+      std::max<double>(kRowCheckRules.min_beyond_chance, kRowCheckRules.min_copy_share * set.size()))
+    return {};
 
   double squares = 0, freedom = 0, pairs = 0;
   for (const Pose& pose : poses) {
@@ -89,8 +87,9 @@ Duplicates FindDuplicates(const touches::Observations& o, const model::Model& mo
       freedom += count - 1;
     }
   }
-  const double sigma_s =
-      freedom >= kMinFreedom ? std::sqrt(std::max(squares, 0.0) / freedom) : ModelNoiseS(model);
+  const double sigma_s = freedom >= kRowCheckRules.min_scatter_dof
+                             ? std::sqrt(std::max(squares, 0.0) / freedom)
+                             : ModelNoiseS(model);
   if (!(sigma_s > 0))
     return equal_session_times ? Duplicates{static_cast<int>(copies.size()), 0, copies[0]} : Duplicates{};
   // Copies on a tick of the sensor are expected with the tick, all others with the resolution of the file.
@@ -103,7 +102,9 @@ Duplicates FindDuplicates(const touches::Observations& o, const model::Model& mo
     // Two normal numbers of a common mean fall on one tick with tick / (2 sqrt(pi) sigma).
     const double match = std::min(1.0, step_s / (2 * std::sqrt(M_PI) * sigma_s));
     const double expected = pairs * std::pow(match, set.fingers - 1);
-    if (static_cast<double>(end - begin) <= kMinCopies + kOverChance * expected) return;
+    if (static_cast<double>(end - begin) <=
+        kRowCheckRules.min_beyond_chance + kRowCheckRules.over_chance * expected)
+      return;
     found.rows += static_cast<int>(end - begin);
     found.expected += expected;
     for (auto copy = begin; copy != end; ++copy)

@@ -6,17 +6,10 @@
 #include <optional>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/checks/rows/rules.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr double kStandsOut = 6;      // standard errors of the round's factor
-constexpr double kOthersAgree = 4;    // ... of every other round's, without it
-constexpr double kMinFactor = 0.003;  // of a difference in speed that is worth a word
-constexpr double kRestIsNoiseP =
-    1e-4;                      // of the round's scatter once the factor is taken off, over the others'
-constexpr int kMinPairs = 20;  // poses of a round that others have touched too
-constexpr int kMinComparedRounds = 3, kMaxComparedRounds = 40;
 
 // The contrasts of one touch with all its fingers, by its round.
 using RoundsOfPose = std::map<int, Eigen::VectorXd>;
@@ -48,7 +41,7 @@ std::optional<Slope> SlopeOf(const std::vector<RoundsOfPose>& poses, int round,
     dd += weight * apart.squaredNorm();
     count += static_cast<double>(mean.size()), pairs += 1;
   }
-  if (pairs < kMinPairs || !(xx > 0)) return std::nullopt;
+  if (pairs < kRowCheckRules.min_pairs || !(xx > 0)) return std::nullopt;
   Slope slope;
   slope.value = xd / xx;
   slope.degrees = count - 1;
@@ -76,8 +69,8 @@ RoundSpeed FindRoundSpeed(const touches::Observations& o) {
     poses[pose].emplace(round, contrasts);
     if (std::find(rounds.begin(), rounds.end(), round) == rounds.end()) rounds.push_back(round);
   }
-  if (static_cast<int>(rounds.size()) < kMinComparedRounds ||
-      static_cast<int>(rounds.size()) > kMaxComparedRounds)
+  if (static_cast<int>(rounds.size()) < kRowCheckRules.min_rounds ||
+      static_cast<int>(rounds.size()) > kRowCheckRules.max_rounds)
     return {};
 
   const auto without = [&rounds](std::initializer_list<int> left_out) {
@@ -90,8 +83,8 @@ RoundSpeed FindRoundSpeed(const touches::Observations& o) {
   Slope best;
   for (const int round : rounds) {
     const std::optional<Slope> slope = SlopeOf(poses, round, without({round}));
-    if (!slope || std::abs(slope->value) < kStandsOut * slope->error ||
-        std::abs(slope->value) < std::max(kMinFactor, std::abs(best.value)))
+    if (!slope || std::abs(slope->value) < kRowCheckRules.stands_out * slope->error ||
+        std::abs(slope->value) < std::max(kRowCheckRules.min_speed_difference.value(), std::abs(best.value)))
       continue;
     best = *slope;
     found.round = round;
@@ -101,11 +94,11 @@ RoundSpeed FindRoundSpeed(const touches::Observations& o) {
   for (const int round : without({found.round})) {
     const std::optional<Slope> slope = SlopeOf(poses, round, without({found.round, round}));
     if (!slope) continue;
-    if (std::abs(slope->value) > kOthersAgree * slope->error) return {};
+    if (std::abs(slope->value) > kRowCheckRules.others_agree * slope->error) return {};
     others_s2 += slope->degrees * slope->scatter_s2, others += slope->degrees;
   }
-  if (!(others > 0) ||
-      FisherTail(best.scatter_s2 / (others_s2 / others), best.degrees, others) < kRestIsNoiseP)
+  if (!(others > 0) || FisherTail(best.scatter_s2 / (others_s2 / others), best.degrees, others) <
+                           kRowCheckRules.rest_is_noise_p)
     return {};
   found.factor = 1 / (1 + best.value);
   found.std_error = best.error * found.factor * found.factor;

@@ -5,15 +5,12 @@
 #include <iterator>
 #include <map>
 
+#include "server/diagnosis/checks/rows/rules.h"
+
 namespace touchstone::diagnosis::checks {
 namespace {
 
-constexpr double kDigitS = 1e-6;    // files keep whole microseconds
-constexpr int kMinShared = 6;       // touches
-constexpr double kOverOthers = 5;   // of those that share one of the next times
-constexpr int kOthers = 10;         // times below the largest
-constexpr double kLater = 0.8;      // of them are expected later
-constexpr double kMinLateM = 2e-4;  // of travel, by which half of them are at least, and by which they differ
+constexpr double kDigitS = 1e-6;  // files keep whole microseconds
 
 // One finger's readings, since the first contact of their touch.
 struct Reading {
@@ -48,15 +45,17 @@ bool IsCutOff(const std::map<int64_t, std::vector<Reading>>& by_time) {
   const std::vector<Reading>& last = by_time.rbegin()->second;
   size_t others = 1;
   int counted = 0;
-  for (auto below = std::next(by_time.rbegin()); below != by_time.rend() && counted < kOthers;
-       ++below, ++counted)
+  for (auto below = std::next(by_time.rbegin());
+       below != by_time.rend() && counted < kRowCheckRules.compared_times; ++below, ++counted)
     others = std::max(others, below->second.size());
-  if (last.size() < std::max<double>(kMinShared, kOverOthers * others)) return false;
+  if (last.size() < std::max<double>(kRowCheckRules.min_shared, kRowCheckRules.over_others * others))
+    return false;
   std::vector<double> late_m;
   for (const Reading& reading : last) late_m.push_back(reading.late_m);
   std::sort(late_m.begin(), late_m.end());
   const auto at = [&](double share) { return late_m[static_cast<size_t>(share * (late_m.size() - 1))]; };
-  return at(1 - kLater) > 0 && at(0.5) > kMinLateM && at(0.75) - at(0.25) > kMinLateM;
+  return at(1 - kRowCheckRules.later_share) > 0 && at(0.5) > kRowCheckRules.min_late_m &&
+         at(0.75) - at(0.25) > kRowCheckRules.min_late_m;
 }
 
 }  // namespace

@@ -1,13 +1,10 @@
 #include "server/diagnosis/checks/rows/stale_rows.h"
 
+#include "server/diagnosis/checks/rows/rules.h"
 #include "server/session/measurements/measurement_fix.h"
 
 namespace touchstone::diagnosis::checks {
 namespace {
-
-constexpr int kMinStale = 3;
-constexpr double kStaleOverChance = 10;
-constexpr int kFirstLag = 3, kLastLag = 30;  // rows so far apart are alike by chance alone
 
 // One pose in a row may well give the same times again.
 bool SamePose(const session::MeasurementSet& set, int a, int b) {
@@ -25,11 +22,13 @@ StaleRows FindStaleRows(const session::MeasurementSet& set) {
       ++found.rows;
       if (found.example < 0) found.example = row;
     }
-    for (int lag = kFirstLag; lag <= kLastLag; ++lag)
+    for (int lag = kRowCheckRules.first_lag; lag <= kRowCheckRules.last_lag; ++lag)
       if (row >= lag && !SamePose(set, row, row - lag)) alike += session::RepeatsRow(set, row, lag);
   }
-  found.expected = static_cast<double>(alike) / (kLastLag - kFirstLag + 1);
-  return found.rows > kMinStale + kStaleOverChance * found.expected ? found : StaleRows{};
+  found.expected = static_cast<double>(alike) / (kRowCheckRules.last_lag - kRowCheckRules.first_lag + 1);
+  return found.rows > kRowCheckRules.min_beyond_chance + kRowCheckRules.over_chance * found.expected
+             ? found
+             : StaleRows{};
 }
 
 }  // namespace touchstone::diagnosis::checks
