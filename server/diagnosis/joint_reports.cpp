@@ -6,6 +6,7 @@
 #include "server/diagnosis/answers/early_verdicts.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/images/photograph_modality.h"
+#include "server/diagnosis/images/rules.h"
 #include "server/diagnosis/joint/shared_effects.h"
 #include "server/diagnosis/photograph_reports.h"
 #include "server/diagnosis/progress_gate.h"
@@ -149,7 +150,7 @@ class JointDiagnoser {
                                 selection::MakeWorkspace(touches_, Stretch(context_, 0, 0)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const images::Photographs photographs,
                                 images::MakePhotographs(photographs_, context_.pool));
-    return TouchesNeeded(*workspace->observations) == 0 && photographs.poses >= images::kMinPoses;
+    return TouchesNeeded(*workspace->observations) == 0 && photographs.poses >= images::kImageRules.min_poses;
   }
 
   absl::Status ComparePictures() {

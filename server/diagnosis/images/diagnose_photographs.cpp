@@ -5,6 +5,7 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/images/photo_ladder.h"
+#include "server/diagnosis/images/rules.h"
 #include "server/diagnosis/images/search/photo_quality.h"
 #include "server/diagnosis/images/search/photo_search.h"
 
@@ -60,9 +61,9 @@ absl::StatusOr<PhotographDiagnosis> DiagnosePhotographs(const DiagnosisInput& in
   Expectation own;
   if (expectation == nullptr) expectation = &own;
   TOUCHSTONE_ASSIGN_OR_RETURN(PhotographDiagnosis diagnosis, Begin(input, context, expectation));
-  if (expectation->photographs.poses < kMinPoses) {
+  if (expectation->photographs.poses < kImageRules.min_poses) {
     diagnosis.verdict = engine::Verdict::kTooLittleData;
-    diagnosis.images_needed = kMinPoses;
+    diagnosis.images_needed = kImageRules.min_poses;
   } else {
     TOUCHSTONE_RETURN_IF_ERROR(context.Enter("fitting", 0.1));
     TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSelection selection,

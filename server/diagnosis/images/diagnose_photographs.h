@@ -12,8 +12,6 @@
 
 namespace touchstone::diagnosis::images {
 
-inline constexpr int kMinPoses = 6;  // that a verdict needs
-
 // How wrong. The verdict is kNone.
 absl::StatusOr<PhotographDiagnosis> ComparePhotographs(const DiagnosisInput& input,
                                                        const DiagnosisContext& context,

@@ -8,6 +8,7 @@
 #include "server/diagnosis/images/pixels/photo_cells.h"
 #include "server/diagnosis/images/rows/photo_flow.h"
 #include "server/diagnosis/images/rows/photo_rows.h"
+#include "server/diagnosis/images/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
@@ -82,7 +83,7 @@ absl::StatusOr<std::vector<uncertainty::Budget>> BudgetOfPhotographs(const Photo
     moved.push_back(Moved(fit, values[i], error));
   }
   const image::PhotoSimulator simulator(std::make_shared<const model::Model>(fit.model.At(fit.point)));
-  const int count = std::min(photographs.size(), kMaxBudgetPhotographs);
+  const int count = std::min(photographs.size(), kImageRules.max_budget_photographs.value());
   std::vector<int> chosen(count);
   for (int i = 0; i < count; ++i) chosen[i] = i * photographs.size() / count;
   std::vector<absl::StatusOr<Eigen::MatrixXd>> products(count);

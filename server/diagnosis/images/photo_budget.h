@@ -10,10 +10,9 @@
 namespace touchstone::diagnosis::images {
 
 // Of the free values of `fit` whose effects `improved` has; `covariance` of all free values of the fit. `noise_grey`: of one
-// pixel. Simulates at most kMaxBudgetPhotographs, evenly chosen, twice per value: one standard error below and above it;
-// contours move with the picture's flow between the two (photo_flow.h).
+// pixel. Simulates at most ImageRules::max_budget_photographs, evenly chosen, twice per value: one standard error below and
+// above it; contours move with the picture's flow between the two (photo_flow.h).
 // Errors are those of the simulator.
-inline constexpr int kMaxBudgetPhotographs = 12;
 absl::StatusOr<std::vector<uncertainty::Budget>> BudgetOfPhotographs(const Photographs& photographs,
                                                                      const engine::Fit& fit,
                                                                      const Eigen::MatrixXd& covariance,

@@ -14,17 +14,13 @@
 #include "server/diagnosis/images/rows/photo_covariates.h"
 #include "server/diagnosis/images/rows/photo_rest_kinds.h"
 #include "server/diagnosis/images/rows/photo_uneven_noise.h"
+#include "server/diagnosis/images/rules.h"
+#include "server/diagnosis/images/search/rules.h"
 #include "server/diagnosis/images/terms/photo_formula.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-// Rows hardly count contours, which are point-sampled: an error so many times the floor is none of theirs.
-constexpr double kMisfitPixels = 1.2;
-constexpr double kRestP = 1e-4;
-constexpr double kCurveGain = 0.01;  // of the mean square residual of pictures that a curve did not see
-constexpr double kAlbedoNats = 5;
-constexpr double kDoubted = 0.5;  // the most that a candidate is where no step was worth its entry
 constexpr char kUnknownInWords[] =
     "Pictures differ from what is expected by more than their pixels scatter. Nothing in the catalogue "
     "explains it, "
@@ -85,7 +81,7 @@ class PhotoLadder {
     // What was not found good enough for a step is not probable, whatever it is compared with.
     if (selection_.steps.empty())
       for (engine::RankedCandidate& candidate : d_.candidates)
-        candidate.probability = std::min(candidate.probability, kDoubted);
+        candidate.probability = std::min(candidate.probability, kImageRules.max_doubted.value());
     if (d_.unexplained && d_.nothing_missing)
       d_.nothing_missing = engine::WithRest(*d_.nothing_missing, *d_.unexplained);
     engine::Conclude(found_, engine::ExplainedShare(d_.initial->rmse, d_.final->rmse, d_.noise_floor.sigma),
@@ -157,7 +153,7 @@ class PhotoLadder {
         {{P::kMisfit, [&] { return found_.AddIf(HasMisfit(), P::kMisfit); }},
          {P::kAlbedo,
           [&] {
-            return found_.AddIf(fit_.hypothesis != 0 && selection_.albedo_nats > kAlbedoNats &&
+            return found_.AddIf(fit_.hypothesis != 0 && selection_.albedo_nats > kImageRules.albedo_nats &&
                                     ShareOf(RestKind::kOnObjects, kinds) > 0,
                                 P::kAlbedo);
           }},
@@ -182,14 +178,15 @@ class PhotoLadder {
   bool HasMisfit() {
     const RowsMisfit misfit = MisfitOfRows(selection_.fine, fit_);
     d_.final->lack_of_fit_p = std::min(d_.final->lack_of_fit_p, misfit.p);
-    return (misfit.p < kRestP && misfit.in_noise > kMisfitRows) ||
-           d_.final->rmse > kMisfitPixels * d_.noise_floor.sigma;
+    return (misfit.p < kImageRules.rest_p && misfit.in_noise > kPhotoSearchRules.misfit_rows) ||
+           d_.final->rmse > kImageRules.clear_misfit * d_.noise_floor.sigma;
   }
 
   absl::Status AskDependence(const std::vector<PhotoCovariate>& covariates) {
     std::vector<engine::CovariateTest> tests;
     for (const PhotoCovariate& c : covariates)
-      if (c.p < kRestP && c.unseen_gain > kCurveGain) tests.push_back({c.name, c.p, c.gain_nats});
+      if (c.p < kImageRules.rest_p && c.unseen_gain > kImageRules.curve_gain)
+        tests.push_back({c.name, c.p, c.gain_nats});
     return found_.AddIf(!tests.empty(), P::kDependence, "",
                         [tests](engine::UnexplainedRest* rest) { rest->covariates = tests; });
   }

@@ -3,15 +3,13 @@
 #include <cmath>
 
 #include "server/diagnosis/images/photo_ladder.h"
+#include "server/diagnosis/images/rules.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr double kRounding = 1.0 / 12;  // variance of rounding to 8 bits
-constexpr double kMinSigmaGrey = 0.15;  // less is rounding
-constexpr double kSeenErrors = 4;       // standard errors from where a difference counts
-constexpr double kSeenShare = 0.05;     // ... and of the value
 
 engine::ParameterEstimate Estimate(const model::ParameterInfo& parameter, double value, double error) {
   engine::ParameterEstimate estimate;
@@ -31,7 +29,7 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
   const std::shared_ptr<const model::Effect> effect = effects::FindByRole(model::EffectRole::kPixelNoise);
   const double sigma =
       std::sqrt(std::max(found.sigma_grey * found.sigma_grey - kRounding / std::max(channels, 1), 0.0));
-  const bool grows = found.gain > kSeenErrors * found.gain_error;
+  const bool grows = found.gain > kImageRules.seen_errors * found.gain_error;
   const double gain = grows ? found.gain : 0;
   const double error = sigma > 0 ? found.sigma_error * found.sigma_grey / sigma : found.sigma_error;
   std::vector<engine::ParameterEstimate> parameters = {
@@ -41,16 +39,18 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
     return instance.effect->name == effect->name;
   });
   if (own == effects.end()) {
-    if (sigma < kMinSigmaGrey && gain == 0) return;
+    if (sigma < kImageRules.min_sigma_grey && gain == 0) return;
     engine::LadderStep& step = engine::AddNoiseStep(effect, {sigma, gain}, std::move(parameters),
                                                     engine::kMaxProbability, quality, improvement);
     step.model = improvement->improved;
     return;
   }
-  const double at_middle = 127;
+  const double at_middle = kImageRules.noise_at_grey;
   const double before = std::sqrt(own->values[0] * own->values[0] + own->values[1] * at_middle);
   const double after = std::sqrt(sigma * sigma + gain * at_middle);
-  if (std::abs(after - before) < std::max(kSeenShare * before, kSeenErrors * found.sigma_error)) return;
+  if (std::abs(after - before) <
+      std::max(kImageRules.seen_share * before, kImageRules.seen_errors * found.sigma_error))
+    return;
   parameters[0].before = own->values[0];
   parameters[1].before = own->values[1];
   improvement->refitted.push_back({effect->name, parameters});

@@ -4,11 +4,12 @@
 
 #include <cmath>
 
+#include "server/diagnosis/images/pixels/rules.h"
+
 namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr int kMaxHalfWaves = 6;  // across and down together
-constexpr double kTypicalGrey = 5, kMaxGrey = 200;
 
 }  // namespace
 
@@ -22,9 +23,9 @@ std::shared_ptr<const model::Effect> ImageFieldEffect() {
       model::ParameterInfo parameter;
       parameter.name = absl::StrCat("wave", i, "_grey");
       parameter.unit = Unit::kGreyLevel;
-      parameter.lower = -kMaxGrey;
-      parameter.upper = kMaxGrey;
-      parameter.typical = kTypicalGrey;
+      parameter.lower = -kPixelRules.field_max_grey;
+      parameter.upper = kPixelRules.field_max_grey;
+      parameter.typical = kPixelRules.field_typical_grey;
       field->parameters.push_back(parameter);
     }
     field->apply_to_photo = [](absl::Span<const double>, effects::PhotoSettings&) {};

@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/images/pixels/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMinStepGrey = 4;  // between neighbouring pixels, from which it is a contour
 // The mean of a clipped pixel is as good as what is known of its noise there: it counts as if it scattered so much.
-constexpr double kClippedSigmas = 15;
 
 // The largest over each pixel and its neighbours.
 std::vector<float> LargestAround(const std::vector<float>& image, int width, int height) {
@@ -39,7 +38,8 @@ std::vector<float> ContourSquares(const std::vector<float>& grey, int width, int
   const std::vector<float> least = LargestAround(negative, width, height);
   std::vector<float> squares(grey.size());
   for (size_t i = 0; i < grey.size(); ++i) {
-    const double step = std::max(static_cast<double>(most[i]) + least[i] - kMinStepGrey, 0.0);
+    const double step =
+        std::max(static_cast<double>(most[i]) + least[i] - kPixelRules.contour_step_grey, 0.0);
     squares[i] = static_cast<float>(step * step);
   }
   return LargestAround(squares, width, height);
@@ -59,7 +59,8 @@ Eigen::VectorXf CellWeights(const CellGrid& grid, const std::vector<float>& grey
     for (int x = 0; x < grid.width; ++x) {
       const size_t pixel = static_cast<size_t>(y) * grid.width + x;
       const double variance_here = record.Variance(grey[pixel]);
-      const double clipped = kClippedSigmas * kClippedSigmas * variance_here * record.Clipped(grey[pixel]);
+      const double clipped = kPixelRules.clipped_sigmas * kPixelRules.clipped_sigmas * variance_here *
+                             record.Clipped(grey[pixel]);
       variance[y / grid.cell * grid.columns() + x / grid.cell] +=
           static_cast<float>(contour_px2 * contour[pixel] + variance_here + clipped);
     }

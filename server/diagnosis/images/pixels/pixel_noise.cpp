@@ -7,34 +7,30 @@
 #include <limits>
 #include <numeric>
 
+#include "server/diagnosis/images/pixels/rules.h"
+
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kStepGrey = 0.125;
 constexpr double kWhite = 255, kGreyLevels = 256;
 constexpr int kPerGrey = 8;  // entries of a table
 constexpr int kEntries = 255 * kPerGrey + 1;
 constexpr double kRoundingVariance = 1.0 / 12;
-constexpr double kNoTail = 1e-12;
 constexpr size_t kBlock = 64;             // pixels that are looked at together
-constexpr double kKept = 0.8;             // share of the differences that counts
 constexpr double kKeptVariance = 0.4377;  // mean square of the smallest 80 % of normal numbers
-constexpr double kClipped = 4;            // standard deviations from black or white
-constexpr double kClippedBin = 5;         // ... of the levels of a bin whose scatter is not cut, at least
-constexpr double kMinCount = 200;         // differences that a bin needs
 
-// Of the smallest kKept of a histogram: their mean square, scaled to a normal number's variance.
+// Of the smallest kept_share of a histogram: their mean square, scaled to a normal number's variance.
 double TrimmedVariance(const double* counts, const double* squares, int steps) {
   double total = 0;
   for (int s = 0; s < steps; ++s) total += counts[s];
-  double left = kKept * total, sum = 0;
+  double left = kPixelRules.kept_share * total, sum = 0;
   for (int s = 0; s < steps && left > 0; ++s) {
     if (counts[s] == 0) continue;
     const double taken = std::min(left, counts[s]);
     sum += squares[s] * taken / counts[s];
     left -= taken;
   }
-  return total > 0 ? sum / (kKept * total) / kKeptVariance : 0;
+  return total > 0 ? sum / (kPixelRules.kept_share * total) / kKeptVariance : 0;
 }
 
 // Levels whose pixels are hardly ever clipped: what is cut at black or white scatters too little. Where every level is
@@ -46,7 +42,8 @@ std::vector<LevelScatter> Unclipped(const std::vector<LevelScatter>& levels, dou
   };
   std::vector<LevelScatter> kept;
   for (const LevelScatter& level : levels)
-    if (room(level) > 0 && room(level) >= kClippedBin * std::sqrt(level.variance)) kept.push_back(level);
+    if (room(level) > 0 && room(level) >= kPixelRules.clipped_bin * std::sqrt(level.variance))
+      kept.push_back(level);
   if (!kept.empty()) return kept;
   return {*std::max_element(levels.begin(), levels.end(),
                             [&](const auto& a, const auto& b) { return room(a) < room(b); })};
@@ -62,14 +59,14 @@ RecordedPixel Record(double grey, const PixelNoise& noise) {
   const double variance = std::max(noise.Variance(grey), kRoundingVariance);
   const double sigma = std::sqrt(variance);
   const double low = -grey / sigma, high = (kWhite - grey) / sigma;
-  if (low < -kClipped && high > kClipped) return {grey, variance, 0};
+  if (low < -kPixelRules.clipped_from && high > kPixelRules.clipped_from) return {grey, variance, 0};
   // The record is the light with its scatter, rounded, then cut at the ends: sums of the tails of its levels. (Cut before
   // it is rounded, its mean at black would be a sixtieth of a grey level higher, which weighs millions of pixels.)
   const double unrounded = std::sqrt(std::max(variance - kRoundingVariance, kRoundingVariance));
   double mean = 0, square = 0;
   for (int level = 1; level <= static_cast<int>(kWhite); ++level) {
     const double reaches = Tail((level - 0.5 - grey) / unrounded);
-    if (reaches < kNoTail) break;
+    if (reaches < kPixelRules.no_tail) break;
     mean += reaches;
     square += (2 * level - 1) * reaches;
   }
@@ -146,9 +143,11 @@ void NoiseGatherer::Add(const std::vector<float>& image, const std::vector<float
       const float most = std::max({level[x - 1], level[x], level[x + 1]});
       if (least < 1 || most > kWhite - 1) continue;
       const double difference = std::abs(row[x - 1] - 2.0 * row[x] + row[x + 1]) * scale;
-      const int step = std::min(static_cast<int>(difference / kStepGrey), kSteps - 1);
-      const int bin = std::clamp(static_cast<int>(level[x] * kBins / kGreyLevels), 0, kBins - 1);
-      const size_t at = static_cast<size_t>(bin) * kSteps + step;
+      const int step = std::min(static_cast<int>(difference / kPixelRules.difference_step_grey),
+                                kPixelRules.difference_steps - 1);
+      const int bin = std::clamp(static_cast<int>(level[x] * kPixelRules.level_bins / kGreyLevels), 0,
+                                 kPixelRules.level_bins - 1);
+      const size_t at = static_cast<size_t>(bin) * kPixelRules.difference_steps + step;
       counts_[at] += 1;
       squares_[at] += difference * difference;
     }
@@ -170,16 +169,18 @@ double NoiseGatherer::count() const {
 
 std::vector<LevelScatter> NoiseGatherer::Levels() const {
   std::vector<LevelScatter> levels;
-  constexpr double kBinGrey = kGreyLevels / kBins;
-  for (int bin = 0; bin < kBins; ++bin) {
-    const size_t at = static_cast<size_t>(bin) * kSteps;
-    const double count = std::accumulate(&counts_[at], &counts_[at] + kSteps, 0.0);
-    if (count < kMinCount) continue;
-    levels.push_back({(bin + 0.5) * kBinGrey,
-                      std::max(TrimmedVariance(&counts_[at], &squares_[at], kSteps), kRoundingVariance),
+  const double bin_grey = kGreyLevels / kPixelRules.level_bins;
+  for (int bin = 0; bin < kPixelRules.level_bins; ++bin) {
+    const size_t at = static_cast<size_t>(bin) * kPixelRules.difference_steps;
+    const double count =
+        std::accumulate(&counts_[at], &counts_[at] + kPixelRules.difference_steps.value(), 0.0);
+    if (count < kPixelRules.min_count) continue;
+    levels.push_back({(bin + 0.5) * bin_grey,
+                      std::max(TrimmedVariance(&counts_[at], &squares_[at], kPixelRules.difference_steps),
+                               kRoundingVariance),
                       count});
   }
-  return Unclipped(levels, kBinGrey);
+  return Unclipped(levels, bin_grey);
 }
 
 PixelNoise NoiseGatherer::Estimate() const {
@@ -204,8 +205,8 @@ PixelNoise NoiseGatherer::Estimate() const {
     square = kRoundingVariance;
     gain = std::max((sxy - square * sx) / sxx, 0.0);
   }
-  // A bin's variance is known to its share sqrt(2 / (kTrimmedEfficiency * count)).
-  const double variance_scale = 2 / kTrimmedEfficiency;
+  // A bin's variance is known to its share sqrt(2 / (trimmed_efficiency * count)).
+  const double variance_scale = 2 / kPixelRules.trimmed_efficiency;
   PixelNoise noise;
   noise.sigma_grey = std::sqrt(square);
   noise.gain = gain;

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "server/diagnosis/images/pixels/rules.h"
+
 namespace touchstone::diagnosis::images {
 
 // The scatter of single pixels: variance sigma^2 + gain * grey, rounding to 8 bits included.
@@ -47,8 +49,6 @@ struct LevelScatter {
   double grey = 0, variance = 0;
   double count = 0;  // of differences
 };
-inline constexpr double kTrimmedEfficiency =
-    0.35;  // of such a difference, which is trimmed and shares pixels, as a degree of freedom
 
 // Gathers second differences of images along their rows, by grey level.
 class NoiseGatherer {
@@ -67,10 +67,10 @@ class NoiseGatherer {
   double count() const;
 
  private:
-  static constexpr int kBins = 16;
-  static constexpr int kSteps = 400;  // of a histogram of absolute second differences, kStepGrey wide
-  std::vector<double> counts_ = std::vector<double>(static_cast<size_t>(kBins) * kSteps, 0.0);
-  std::vector<double> squares_ = std::vector<double>(static_cast<size_t>(kBins) * kSteps, 0.0);
+  std::vector<double> counts_ =
+      std::vector<double>(static_cast<size_t>(kPixelRules.level_bins) * kPixelRules.difference_steps, 0.0);
+  std::vector<double> squares_ =
+      std::vector<double>(static_cast<size_t>(kPixelRules.level_bins) * kPixelRules.difference_steps, 0.0);
 };
 
 }  // namespace touchstone::diagnosis::images

@@ -5,13 +5,12 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/units.h"
+#include "server/diagnosis/images/rows/rules.h"
+#include "server/diagnosis/images/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr int kBinsOfCurve = 10, kCurveFolds = 5;
-constexpr double kMaxClipped = 0.001;  // of a pixel's records
-constexpr double kMinShare = 1e-3;     // of the pixels, that a bin holds
 constexpr const char* kNames[] = {"radius",        "row",      "column",        "grey",
                                   "incidence_deg", "depth_mm", "session_time_s"};
 constexpr int kNamed = 7;
@@ -50,18 +49,18 @@ PhotoCovariate Judge(const std::string& name, const BinSums& bins, double low, d
   for (const auto& counts : bins.count)
     for (const double count : counts) total += count;
   double explained = 0, smallest = 1, taken = 0;
-  for (int b = 0; b < kBinsOfCurve; ++b) {
+  for (int b = 0; b < kPhotoRowRules.curve_bins; ++b) {
     double sum = 0, count = 0;
     int with = 0;
     for (int pose = 0; pose < poses; ++pose)
       sum += bins.sum[pose][b], count += bins.count[pose][b], with += bins.count[pose][b] > 0;
-    if (count < kMinShare * total || with < 3) continue;
+    if (count < kPhotoRowRules.min_bin_share * total || with < 3) continue;
     const double mean = sum / count;
     double scatter = 0;
     for (int pose = 0; pose < poses; ++pose)
       scatter += std::pow(bins.sum[pose][b] - mean * bins.count[pose][b], 2);
     const double error = std::sqrt(scatter * with / (with - 1.0)) / count;
-    result.knots.push_back(low + (b + 0.5) * (high - low) / kBinsOfCurve);
+    result.knots.push_back(low + (b + 0.5) * (high - low) / kPhotoRowRules.curve_bins);
     result.mean_grey.push_back(mean);
     if (error > 0) {
       const double t = std::abs(mean) / error;
@@ -69,9 +68,9 @@ PhotoCovariate Judge(const std::string& name, const BinSums& bins, double low, d
       explained += 0.5 * t * t;
     }
     // What the mean of the other folds takes from each fold.
-    for (int fold = 0; fold < kCurveFolds; ++fold) {
+    for (int fold = 0; fold < kImageRules.folds; ++fold) {
       double own_sum = 0, own_count = 0;
-      for (int pose = fold; pose < poses; pose += kCurveFolds)
+      for (int pose = fold; pose < poses; pose += kImageRules.folds)
         own_sum += bins.sum[pose][b], own_count += bins.count[pose][b];
       if (count - own_count <= 0) continue;
       const double other = (sum - own_sum) / (count - own_count);
@@ -79,7 +78,7 @@ PhotoCovariate Judge(const std::string& name, const BinSums& bins, double low, d
     }
   }
   result.gain_nats = explained;
-  result.p = std::min(1.0, smallest * kBinsOfCurve * kNamed);
+  result.p = std::min(1.0, smallest * kPhotoRowRules.curve_bins * kNamed);
   result.unseen_gain = squares > 0 ? taken / squares : 0;
   return result;
 }
@@ -104,17 +103,17 @@ std::vector<PhotoCovariate> TestCovariates(const Photographs& p, const std::vect
         }
     if (!(high > low)) continue;
     BinSums bins;
-    bins.sum.assign(p.poses, std::vector<double>(kBinsOfCurve, 0.0));
+    bins.sum.assign(p.poses, std::vector<double>(kPhotoRowRules.curve_bins.value(), 0.0));
     bins.count = bins.sum;
     for (int k = 0; k < p.size(); ++k)
       for (int y = 0; y < p.height(); ++y)
         for (int x = 0; x < p.width(); ++x) {
           const double value = ValueOf(covariate, p, expected[k], k, x, y);
           if (std::isnan(value)) continue;
-          const int b =
-              std::clamp(static_cast<int>((value - low) / (high - low) * kBinsOfCurve), 0, kBinsOfCurve - 1);
+          const int b = std::clamp(static_cast<int>((value - low) / (high - low) * kPhotoRowRules.curve_bins),
+                                   0, kPhotoRowRules.curve_bins - 1);
           const size_t at = static_cast<size_t>(y) * p.width() + x;
-          if (p.record->Clipped(expected[k].grey[at]) > kMaxClipped) continue;
+          if (p.record->Clipped(expected[k].grey[at]) > kPhotoRowRules.max_clipped_share) continue;
           bins.sum[p.pose[k]][b] += static_cast<double>(p.measured_grey[k][at]) - expected[k].grey[at];
           bins.count[p.pose[k]][b] += 1;
         }

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/images/rows/rules.h"
+
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr int kAroundPx = 6;  // beyond the object's outline, that blurred contours reach
 
 // Pixels without a displacement take the mean of their neighbours that have one.
 void Spread(int width, int height, std::vector<uint8_t>* known, std::vector<Eigen::Vector2f>* move_px) {
@@ -22,7 +22,7 @@ void Spread(int width, int height, std::vector<uint8_t>* known, std::vector<Eige
     if ((*known)[at]) latest.push_back(at);
   std::vector<Eigen::Vector2f> means;
   std::vector<uint8_t> reached = *known;
-  for (int pass = 0; pass < kAroundPx; ++pass) {
+  for (int pass = 0; pass < kPhotoRowRules.around_px; ++pass) {
     border.clear(), means.clear();
     for (const int from : latest)
       for_neighbours(from, [&](int at) {

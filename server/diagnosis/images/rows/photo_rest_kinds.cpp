@@ -9,18 +9,12 @@
 #include <numeric>
 
 #include "server/diagnosis/images/rows/rest_kind_sums.h"
+#include "server/diagnosis/images/rows/rules.h"
 #include "server/diagnosis/images/rows/stuck_pixels.h"
+#include "server/diagnosis/images/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr int kBlockPx = 16;              // side of a block of a picture
-constexpr double kMaxFewShare = 0.1;      // of the pictures, that are a few
-constexpr double kMinFewShare = 0.5;      // of the excess, that they hold
-constexpr double kMinCauseShare = 0.5;    // of the excess, that a kind takes whose cause is named
-constexpr double kMinOneObject = 0.7;     // of the excess, that the pictures of one object hold,
-constexpr double kMinOneObjectRatio = 2;  // ... over their share of the pictures
-constexpr double kShear = 0.5;            // of a displacement, that grows from row to row: a shutter
 
 class RestKinds {
  public:
@@ -39,10 +33,10 @@ class RestKinds {
     std::vector<KindOfRest> kinds;
     if (!(excess_ > 0)) return kinds;
     for (const KindOfRest& kind : {Few(), Stuck(), Light(), Place(), InPicture(), OnObjects(), Contours()})
-      if (kind.share >= kMinKindShare) kinds.push_back(kind);
+      if (kind.share >= kPhotoRowRules.min_kind_share) kinds.push_back(kind);
     std::stable_sort(kinds.begin(), kinds.end(),
                      [](const auto& a, const auto& b) { return a.share > b.share; });
-    if (kinds.empty() || kinds[0].share < kMinCauseShare)
+    if (kinds.empty() || kinds[0].share < kPhotoRowRules.min_cause_share)
       if (KindOfRest one = OneObject(); one.share > 0) kinds.insert(kinds.begin(), std::move(one));
     return kinds;
   }
@@ -64,7 +58,7 @@ class RestKinds {
           return grey[static_cast<size_t>(std::clamp(row, 0, height - 1)) * width +
                       std::clamp(column, 0, width - 1)];
         };
-        const int half = (x / kBlockPx + y / kBlockPx) % 2;
+        const int half = (x / kPhotoRowRules.block_px + y / kPhotoRowRules.block_px) % 2;
         sums.light[half].Add(Eigen::Matrix<double, 1, 1>(expected), residual);
         const double right = 0.5 * (near(x - 1, y) - near(x + 1, y)),
                      down = 0.5 * (near(x, y - 1) - near(x, y + 1)), v = 2 * (y + 0.5) / height - 1;
@@ -73,15 +67,17 @@ class RestKinds {
         const double bend = near(x - 1, y) + near(x + 1, y) + near(x, y - 1) + near(x, y + 1) - 4 * expected;
         if (bend != 0) sums.contours.Add(Eigen::Matrix<double, 1, 1>(bend), residual);
         sums.in_picture.Add(
-            static_cast<size_t>(y * kKindMapSide / height * kKindMapSide + x * kKindMapSide / width),
+            static_cast<size_t>(y * kPhotoRowRules.map_cells / height * kPhotoRowRules.map_cells +
+                                x * kPhotoRowRules.map_cells / width),
             expected, residual);
         if (photo.mask[at] == 0) continue;
         size_t place = 0;
         for (int axis = 0; axis < 3; ++axis) {
           const double extent = std::max(bounds.max_m[axis] - bounds.min_m[axis], 1e-9);
           const double share = (photo.point_m[at][axis] - bounds.min_m[axis]) / extent;
-          place = place * kKindPlaceSide +
-                  std::clamp(static_cast<int>(share * kKindPlaceSide), 0, kKindPlaceSide - 1);
+          place =
+              place * kImageRules.object_cells +
+              std::clamp(static_cast<int>(share * kImageRules.object_cells), 0, kImageRules.object_cells - 1);
         }
         sums.on_object.Add(place, expected, residual);
       }
@@ -95,17 +91,18 @@ class RestKinds {
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(),
                      [&](int a, int b) { return sums_[a].Excess() > sums_[b].Excess(); });
-    const size_t most = std::max<size_t>(1, static_cast<size_t>(kMaxFewShare * p_.size()));
+    const size_t most = std::max<size_t>(1, static_cast<size_t>(kPhotoRowRules.max_few_share * p_.size()));
     double held = 0;
     std::vector<uint64_t> images;
-    for (size_t n = 0; n < std::min(most, order.size()) && held < kMinFewShare * excess_; ++n) {
+    for (size_t n = 0; n < std::min(most, order.size()) && held < kPhotoRowRules.min_few_share * excess_;
+         ++n) {
       held += sums_[order[n]].Excess();
       images.push_back(p_.set->photographs[p_.row[order[n]]].image);
     }
     std::sort(images.begin(), images.end());
     const double share = Share(held);
     const bool one = images.size() == 1;
-    return {RestKind::kFewPictures, share < kMinFewShare ? 0 : share,
+    return {RestKind::kFewPictures, share < kPhotoRowRules.min_few_share ? 0 : share,
             absl::StrFormat("%.0f %% of it lies in %s %s of %d.", 100 * share, one ? "image" : "images",
                             absl::StrJoin(images, ", "), p_.size()),
             absl::StrFormat("Look at %s for something that covers the object, or for another object or pose "
@@ -118,8 +115,8 @@ class RestKinds {
     for (int k = 0; k < p_.size(); ++k) held[p_.object[k]] += sums_[k].Excess(), ++pictures[p_.object[k]];
     const size_t most = std::max_element(held.begin(), held.end()) - held.begin();
     const double share = Share(held[most]);
-    const bool stands_out =
-        share >= kMinOneObject && share >= kMinOneObjectRatio * pictures[most] / p_.size();
+    const bool stands_out = share >= kPhotoRowRules.min_object_share &&
+                            share >= kPhotoRowRules.min_object_ratio * pictures[most] / p_.size();
     return {RestKind::kOneObject, stands_out ? share : 0,
             absl::StrFormat("%.0f %% of it lies in the pictures of %s (%.0f of %d).", 100 * share,
                             p_.objects[most], pictures[most], p_.size()),
@@ -167,7 +164,7 @@ class RestKinds {
     }
     const double share = Share(taken), even_px = std::sqrt(even / p_.size()),
                  growing_px = 2 * std::sqrt(growing / p_.size());
-    const bool shutter = growing_px > kShear * even_px;
+    const bool shutter = growing_px > kPhotoRowRules.shutter_share * even_px;
     return {
         RestKind::kPlaceOfPicture, share,
         absl::StrFormat(
@@ -252,8 +249,9 @@ std::vector<KindOfRest> KindsOfRest(const Photographs& photographs, const std::v
 }
 
 std::string InWords(const KindOfRest& kind) {
-  return kind.cause.empty() || kind.share < kMinCauseShare ? kind.words
-                                                           : absl::StrCat(kind.words, " ", kind.cause);
+  return kind.cause.empty() || kind.share < kPhotoRowRules.min_cause_share
+             ? kind.words
+             : absl::StrCat(kind.words, " ", kind.cause);
 }
 
 double ShareOf(RestKind kind, const std::vector<KindOfRest>& kinds) {

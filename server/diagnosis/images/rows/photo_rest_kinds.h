@@ -31,16 +31,15 @@ struct KindOfRest {
   std::string cause;  // what may cause it, what to look at; may be empty
 };
 
-// The largest share first; only kinds that take kMinKindShare or more. That it is one object's stands first where no other
-// kind takes half of it. `photographs`: with the noise of what is left; `expected`: of the model, with details.
-inline constexpr double kMinKindShare = 0.15;
+// The largest share first; only kinds that take PhotoRowRules::min_kind_share or more. That it is one object's stands first
+// where no other kind takes half of it. `photographs`: with the noise of what is left; `expected`: of the model, with details.
 std::vector<KindOfRest> KindsOfRest(const Photographs& photographs, const std::vector<image::Photo>& expected,
                                     ThreadPool* pool);
 
 // What is so; what may cause it only where the kind takes half of the excess error or more.
 std::string InWords(const KindOfRest& kind);
 
-// The share of one kind; 0 where it takes less than kMinKindShare.
+// The share of one kind; 0 where it takes less than PhotoRowRules::min_kind_share.
 double ShareOf(RestKind kind, const std::vector<KindOfRest>& kinds);
 
 }  // namespace touchstone::diagnosis::images

@@ -7,11 +7,10 @@
 #include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/pixels/image_field.h"
 #include "server/diagnosis/images/rows/photo_view.h"
+#include "server/diagnosis/images/rows/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr double kFarRows = 1e3;  // noise: of what cannot be simulated
 
 // What the model's effects make of one object's photographs, as bytes: equal for models that photograph it alike.
 std::string KeyOf(const model::Model& model, const std::string& object) {
@@ -175,7 +174,7 @@ Eigen::VectorXd PhotoRows::Expect(const image::PhotoSimulator& simulator, const 
   const std::lock_guard<std::mutex> lock(view.mutex);
   absl::StatusOr<image::Photo> photo =
       simulator.Run(photographs_.requests[view.k], image::PhotoOutputs(), &view.workspace);
-  if (!photo.ok()) return view.measured.array() + kFarRows;
+  if (!photo.ok()) return view.measured.array() + kPhotoRowRules.far_rows.value();
   ToRecordedMeans(*photographs_.record, &*photo);
   return view.Project(grid_, photo->grey);
 }

@@ -11,16 +11,13 @@
 
 #include "server/diagnosis/engine/competition/uneven_parts.h"
 #include "server/diagnosis/images/pixels/photo_cells.h"
+#include "server/diagnosis/images/pixels/rules.h"
+#include "server/diagnosis/images/rows/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
 constexpr int kQuarters = 4;
-constexpr double kContourGrey = 20;  // of a step, from which it is no shade of a curved surface
-constexpr double kMaxCut = 0.001;    // of a pixel's records
-constexpr double kMinDegrees = 200;  // that a part needs
-constexpr size_t kPartsSaid = 6;     // more of them: the least and the most noisy
-constexpr double kHalfBinGrey = 8;   // of NoiseGatherer's grey levels
 
 struct NoisyPart {
   std::string name;
@@ -41,7 +38,7 @@ struct AssessedPicture {
 NoisyPart PartOf(std::string name, const NoiseGatherer& gathered, const PixelNoise& noise) {
   NoisyPart part{std::move(name)};
   for (const LevelScatter& level : gathered.Levels()) {
-    const double degrees = kTrimmedEfficiency * level.count;
+    const double degrees = kPixelRules.trimmed_efficiency * level.count;
     part.degrees += degrees;
     part.ratio += degrees * level.variance / noise.Variance(level.grey);
   }
@@ -51,9 +48,10 @@ NoisyPart PartOf(std::string name, const NoiseGatherer& gathered, const PixelNoi
 
 std::optional<engine::CovariateTest> TestParts(NoisyPartition* partition) {
   std::vector<NoisyPart>& parts = partition->parts;
-  parts.erase(std::remove_if(parts.begin(), parts.end(),
-                             [](const NoisyPart& part) { return part.degrees < kMinDegrees; }),
-              parts.end());
+  parts.erase(
+      std::remove_if(parts.begin(), parts.end(),
+                     [](const NoisyPart& part) { return part.degrees < kPhotoRowRules.min_part_dof; }),
+      parts.end());
   if (parts.size() < 2) return std::nullopt;
   double degrees = 0, mean = 0;
   for (const NoisyPart& part : parts) degrees += part.degrees, mean += part.degrees * part.ratio;
@@ -79,7 +77,8 @@ class UnevenNoiseSearch {
         const std::vector<float> contours = ContourSquares(expected_[k].grey, p_.width(), p_.height());
         for (size_t i = 0; i < contours.size(); ++i) {
           assessed.residual[i] -= expected_[k].grey[i];
-          if (contours[i] > kContourGrey * kContourGrey || p_.record->Clipped(expected_[k].grey[i]) > kMaxCut)
+          if (contours[i] > kPhotoRowRules.contour_grey * kPhotoRowRules.contour_grey ||
+              p_.record->Clipped(expected_[k].grey[i]) > kPhotoRowRules.max_clipped_share)
             assessed.level[i] = 0;
         }
         of_picture_[k].Add(assessed.residual, assessed.level, p_.width(), p_.height(), 1);
@@ -140,9 +139,10 @@ class UnevenNoiseSearch {
 
   NoisyPartition OfGreyLevels() const {
     NoisyPartition made{"grey", "the grey level", {}};
+    const double half_bin_grey = 128.0 / kPixelRules.level_bins;
     for (const LevelScatter& level : all_.Levels()) {
-      NoisyPart part{absl::StrFormat("%g to %g", level.grey - kHalfBinGrey, level.grey + kHalfBinGrey)};
-      part.degrees = kTrimmedEfficiency * level.count;
+      NoisyPart part{absl::StrFormat("%g to %g", level.grey - half_bin_grey, level.grey + half_bin_grey)};
+      part.degrees = kPixelRules.trimmed_efficiency * level.count;
       part.ratio = level.variance / noise_.Variance(level.grey);
       made.parts.push_back(std::move(part));
     }
@@ -192,7 +192,7 @@ std::optional<UnevenNoise> FindUnevenNoise(const Photographs& p, const std::vect
   std::vector<std::string> parts, alike;
   const std::vector<NoisyPart>& own = all[best].parts;
   for (size_t j = 0; j < own.size(); ++j)
-    if (own.size() <= kPartsSaid || j == 0 || j + 1 == own.size())
+    if (own.size() <= kPhotoRowRules.parts_shown || j == 0 || j + 1 == own.size())
       parts.push_back(absl::StrFormat("%s %.2g", own[j].name, search.Scale(own[j])));
   for (size_t j = 0; j < all.size(); ++j)
     if (j != best && tests[j] && tests[j]->gain_nats > engine::kAlikeUnevenShare * tests[best]->gain_nats)

@@ -7,17 +7,11 @@
 #include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/pixels/image_field.h"
 #include "server/diagnosis/images/rows/photo_flow.h"
+#include "server/diagnosis/images/rows/rules.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr double kRayStep = 0.3, kSensorStep = 0.5;  // over a parameter's typical size
-constexpr double kStepPx = 0.5;  // that a step moves contours, at most: they stay among pixels near contours
-constexpr double kTolerance = 1e-4;  // of a direction's squared length, that others leave out
-constexpr int kObjectWaves = 2, kPatchPx = 12;
-constexpr int kMaxRun = 64;         // of cells that are summed in single precision
-constexpr double kMinPatch = 0.25;  // of a patch's pixels that see the object
 
 // Moves one flat value, of every object.
 void MoveValue(model::EffectInstance* instance, int value, double step, double lower, double upper) {
@@ -56,7 +50,7 @@ Eigen::VectorXd PhotoRows::View::Project(const CellGrid& grid, const std::vector
       continue;
     }
     int end = begin + 1;
-    while (end < cells && end - begin < kMaxRun && change[end] != 0) ++end;
+    while (end < cells && end - begin < kPhotoRowRules.max_run && change[end] != 0) ++end;
     const int run = end - begin;
     rows +=
         (basis.middleCols(begin, run) * change.segment(begin, run).cwiseProduct(weights.segment(begin, run)))
@@ -96,7 +90,8 @@ std::vector<PhotoRows::Direction> PhotoRows::DirectionsOf(
       const double si = SiFactor(parameter.unit);
       direction.value = value;
       direction.lower = parameter.lower * si, direction.upper = parameter.upper * si;
-      direction.step = (rays ? kRayStep : kSensorStep) * parameter.typical * si;
+      direction.step = (rays ? kPhotoRowRules.ray_step.value() : kPhotoRowRules.sensor_step.value()) *
+                       parameter.typical * si;
       const double now = direction.base.effects[direction.instance].values[value];
       if (now + direction.step > direction.upper) direction.step = -direction.step;
       direction.moved = direction.base;
@@ -111,7 +106,7 @@ std::vector<PhotoRows::Direction> PhotoRows::DirectionsOf(
       direction.value = -1;
       direction.moved = direction.base;
       model::EffectInstance& instance = direction.moved.effects[direction.instance];
-      MoveValue(&instance, 0, kSensorStep * first.typical * SiFactor(first.unit),
+      MoveValue(&instance, 0, kPhotoRowRules.sensor_step * first.typical * SiFactor(first.unit),
                 first.lower * SiFactor(first.unit), first.upper * SiFactor(first.unit));
       MoveValue(&instance, values - 1, times * last.typical * SiFactor(last.unit),
                 last.lower * SiFactor(last.unit), last.upper * SiFactor(last.unit));
@@ -175,10 +170,10 @@ void AddDisplacements(const std::vector<float>& grey, int width, int height, Dir
 // Smooth light over the object: nameless albedo or lamps.
 void AddObjectLight(const image::Photo& photo, DirectionColumns* columns) {
   std::vector<float> image(photo.grey.size()), along(photo.width);
-  for (int across = 0; across <= kObjectWaves; ++across) {
+  for (int across = 0; across <= kPhotoRowRules.object_waves; ++across) {
     for (int x = 0; x < photo.width; ++x)
       along[x] = static_cast<float>(std::cos(2 * M_PI * across * (x + 0.5) / photo.width));
-    for (int down = 0; down <= kObjectWaves; ++down) {
+    for (int down = 0; down <= kPhotoRowRules.object_waves; ++down) {
       for (int y = 0; y < photo.height; ++y) {
         const auto here = static_cast<float>(std::cos(2 * M_PI * down * (y + 0.5) / photo.height));
         for (int x = 0; x < photo.width; ++x) {
@@ -195,7 +190,7 @@ void AddObjectLight(const image::Photo& photo, DirectionColumns* columns) {
 std::vector<engine::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const image::Photo& photo,
                                                  const Eigen::VectorXf& weights,
                                                  const Eigen::MatrixXf& basis) {
-  const int side = std::max(kPatchPx / grid.cell, 1);  // cells
+  const int side = std::max(kPhotoRowRules.patch_px / grid.cell, 1);  // cells
   std::vector<engine::SmoothErrorSite> sites;
   for (int top = 0; top < grid.rows(); top += side)
     for (int left = 0; left < grid.columns(); left += side) {
@@ -216,7 +211,7 @@ std::vector<engine::SmoothErrorSite> AlbedoSites(const CellGrid& grid, const ima
           const int cell = cy * grid.columns() + cx;
           if (light > 0) row += light * weights[cell] * basis.col(cell);
         }
-      if (seen < kMinPatch * side * side * grid.cell * grid.cell) continue;
+      if (seen < kPhotoRowRules.min_patch_share * side * side * grid.cell * grid.cell) continue;
       engine::SmoothErrorSite site;
       site.position_m = sum / seen;
       for (int q = 0; q < row.size(); ++q) site.row_per_m.push_back(row[q]);
@@ -256,8 +251,8 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
         flow = FlowOfPicture(request, photo, contours,
                              image::PhotoSimulator(std::make_shared<const model::Model>(direction.base)),
                              image::PhotoSimulator(std::make_shared<const model::Model>(direction.moved)));
-        if (flow.farthest_px > kStepPx) {
-          const float share = static_cast<float>(kStepPx) / flow.farthest_px;
+        if (flow.farthest_px > kPhotoRowRules.step_px) {
+          const float share = static_cast<float>(kPhotoRowRules.step_px) / flow.farthest_px;
           step *= share;
           for (Eigen::Vector2f& move_px : flow.move_px) move_px *= share;
           moved = direction.base;
@@ -283,7 +278,7 @@ absl::Status PhotoRows::MakeView(const model::Model& anchor, const std::vector<D
   AddDisplacements(photo.grey, width, height, &columns);
   AddObjectLight(photo, &columns);
 
-  view->basis = OrthonormalSpan(columns.All(), kTolerance).transpose();
+  view->basis = OrthonormalSpan(columns.All(), kPhotoRowRules.span_tolerance).transpose();
   view->SetAnchor(grid_, photo.grey);
   view->slopes.resize(view->basis.rows(), slopes.size());
   for (size_t s = 0; s < slopes.size(); ++s)

@@ -10,13 +10,13 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "server/diagnosis/images/rows/rules.h"
+#include "server/diagnosis/images/rules.h"
+
 namespace touchstone::diagnosis::images {
 
-inline constexpr int kKindFolds = 5;          // of the poses
-inline constexpr int kPlaceColumns = 4;       // right, down, and each growing from row to row
-inline constexpr int kKindMapSide = 14;       // cells along a side of a picture,
-inline constexpr int kKindPlaceSide = 6;      // ... and of an object's box
-inline constexpr double kKindShrinkage = 20;  // pixels' worth of a prior at no change, of a cell
+inline constexpr int kKindFolds = 5;     // of the poses
+inline constexpr int kPlaceColumns = 4;  // right, down, and each growing from row to row
 
 // Sums of a least-squares fit of a few columns to residuals.
 template <int kColumns>
@@ -56,7 +56,9 @@ struct PictureSums {
   std::array<KindSums<1>, 2> light;              // by half of the blocks
   std::array<KindSums<kPlaceColumns>, 2> place;  // the same
   KindSums<1> contours;
-  Cells in_picture{kKindMapSide * kKindMapSide}, on_object{kKindPlaceSide * kKindPlaceSide * kKindPlaceSide};
+  Cells in_picture{static_cast<size_t>(kPhotoRowRules.map_cells * kPhotoRowRules.map_cells)};
+  Cells on_object{
+      static_cast<size_t>(kImageRules.object_cells * kImageRules.object_cells * kImageRules.object_cells)};
   double squares = 0, noise = 0;  // the second: expected of noise alone
 
   double Excess() const { return std::max(squares - noise, 0.0); }
@@ -75,10 +77,10 @@ inline double TakenByCells(const std::vector<const Cells*>& pictures, const std:
     const auto total = [](const auto& of) { return std::accumulate(of.begin(), of.end(), 0.0); };
     const double mean_square = total(squares) / std::max(total(count), 1.0);
     for (int f = 0; f < kKindFolds; ++f) {
-      const double value = (total(sum) - sum[f]) / (total(count) - count[f] + kKindShrinkage);
+      const double value = (total(sum) - sum[f]) / (total(count) - count[f] + kPhotoRowRules.shrinkage_px);
       added += 2 * value * sum[f] - value * value * count[f];
-      const double factor =
-          (total(cross) - cross[f]) / (total(squares) - squares[f] + kKindShrinkage * mean_square + 1e-9);
+      const double factor = (total(cross) - cross[f]) /
+                            (total(squares) - squares[f] + kPhotoRowRules.shrinkage_px * mean_square + 1e-9);
       shared += 2 * factor * cross[f] - factor * factor * squares[f];
     }
   }

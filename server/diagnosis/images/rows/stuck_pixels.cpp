@@ -6,13 +6,10 @@
 #include <array>
 #include <cmath>
 
+#include "server/diagnosis/images/rows/rules.h"
+
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr double kSameSigmas = 8;   // largest less least grey level of a pixel that shows the same always
-constexpr double kApartSigmas = 8;  // from the pixels around it, and from what is expected
-constexpr int kMinApart = 5;        // poses in which it stands out
-constexpr size_t kPlacesShown = 4;
 
 class Finder {
  public:
@@ -42,7 +39,8 @@ class Finder {
       least = std::min(least, p_.measured_grey[k][at]);
       largest = std::max(largest, p_.measured_grey[k][at]);
     }
-    return largest - least <= kSameSigmas * std::sqrt(p_.record->Variance(0.5 * (least + largest)));
+    return largest - least <=
+           kPhotoRowRules.same_sigmas * std::sqrt(p_.record->Variance(0.5 * (least + largest)));
   }
 
   double MedianAround(int k, int x, int y) const {
@@ -59,11 +57,12 @@ class Finder {
   bool StandsOut(int x, int y) const {
     std::vector<char> apart(p_.poses, 0);
     for (int k = 0; k < p_.size(); ++k) {
-      const double far = kApartSigmas * std::sqrt(p_.record->Variance(expected_[k].grey[At(x, y)]));
+      const double far =
+          kPhotoRowRules.apart_sigmas * std::sqrt(p_.record->Variance(expected_[k].grey[At(x, y)]));
       const double residual = Residual(k, x, y);
       if (std::abs(residual) > far && std::abs(residual - MedianAround(k, x, y)) > far) apart[p_.pose[k]] = 1;
     }
-    return std::count(apart.begin(), apart.end(), 1) >= kMinApart;
+    return std::count(apart.begin(), apart.end(), 1) >= kPhotoRowRules.min_apart_poses;
   }
 
   const Photographs& p_;
@@ -78,10 +77,10 @@ StuckPixels FindStuckPixels(const Photographs& photographs, const std::vector<im
 
 std::string PlacesInWords(const StuckPixels& stuck) {
   std::string words;
-  for (size_t n = 0; n < std::min(stuck.places.size(), kPlacesShown); ++n)
+  for (size_t n = 0; n < std::min(stuck.places.size(), kPhotoRowRules.places_shown.value()); ++n)
     absl::StrAppend(&words, n == 0 ? "" : ", ", "column ", stuck.places[n].first, " row ",
                     stuck.places[n].second);
-  return stuck.places.size() > kPlacesShown ? absl::StrCat(words, ", ...") : words;
+  return stuck.places.size() > kPhotoRowRules.places_shown ? absl::StrCat(words, ", ...") : words;
 }
 
 }  // namespace touchstone::diagnosis::images

@@ -10,18 +10,13 @@
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
 #include "server/diagnosis/images/pixels/image_field.h"
+#include "server/diagnosis/images/rules.h"
 #include "server/diagnosis/images/search/photo_quality.h"
 #include "server/diagnosis/images/search/photo_search.h"
+#include "server/diagnosis/images/search/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr double kLargeShare = 0.6;   // of the excess on unseen pictures, that a step beside a rest takes
-constexpr double kLargeMisfit = 1.2;  // of the noise, from where such steps are looked for
-constexpr int kMaxLargeSteps = 3, kMaxLargeTried = 4;
-constexpr double kStepP = 1e-4;      // of a step's values, with the scatter between pictures
-constexpr double kFaint = 0.1;       // of the noise
-constexpr double kNearChoice = 0.1;  // of a choice, that a fitted mean of two is it
 
 // Root mean square over all pixels of all photographs.
 absl::StatusOr<double> ErrorOf(const Photographs& photographs, const model::Model& model, ThreadPool* pool) {
@@ -59,7 +54,7 @@ class LargeSteps {
     TOUCHSTONE_ASSIGN_OR_RETURN(double left, ErrorOf(photographs_, selection_.fit.model.base(), pool_));
     TOUCHSTONE_ASSIGN_OR_RETURN(const double noise,
                                 NoiseOfPixels(photographs_, selection_.fit.model.base(), pool_));
-    if (left < kLargeMisfit * noise) return absl::OkStatus();
+    if (left < kImageRules.clear_misfit * noise) return absl::OkStatus();
     auto plain = std::make_unique<engine::Likelihood>(fine.rows->GroupRows(), nullptr, 0, nullptr);
     plain->SetLeastNoise(1);
     engine::Experiment experiment = *fine.experiment;
@@ -71,13 +66,15 @@ class LargeSteps {
     if (const int field = IndexOfImageField(named.base()); field >= 0) named = named.Without(field);
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(experiment, named));
     bool any = false;
-    for (int step = 0; step < kMaxLargeSteps && left >= kLargeMisfit * noise; ++step) {
+    for (int step = 0; step < kPhotoSearchRules.max_large_steps && left >= kImageRules.clear_misfit * noise;
+         ++step) {
       TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<Tried> best, Best(search, fit));
       if (!best) break;
       TOUCHSTONE_ASSIGN_OR_RETURN(const double ratio,
                                   HeldOutRatio(photographs_, *fine.rows, experiment, best->fit));
       const double unseen = best->left * ratio;
-      if (left * left - unseen * unseen < kLargeShare * (left * left - noise * noise)) break;
+      if (left * left - unseen * unseen < kPhotoSearchRules.large_share * (left * left - noise * noise))
+        break;
       fit = std::move(best->fit);
       left = best->left;
       any = true;
@@ -111,7 +108,7 @@ class LargeSteps {
     int tried = 0;
     for (const engine::Extension& extension : extensions) {
       if (!extension.Acts() || extension.candidate < 0) continue;
-      if (tried++ == kMaxLargeTried) break;
+      if (tried++ == kPhotoSearchRules.max_large_tried) break;
       Tried next;
       TOUCHSTONE_ASSIGN_OR_RETURN(next.fit, search.FitExtension(extension));
       TOUCHSTONE_ASSIGN_OR_RETURN(next.left, ErrorOf(photographs_, next.fit.model.base(), pool_));
@@ -196,12 +193,13 @@ absl::Status AddLargeSteps(const Photographs& photographs, const DiagnosisContex
 absl::Status DropFaintField(PhotoSelection* selection) {
   const int index = IndexOfImageField(selection->fit.model.base());
   if (index < 0) return absl::OkStatus();
-  const int side = 64;  // of a coarse picture
+  const int side = kPhotoSearchRules.field_side;
   const std::vector<double>& values = selection->fit.model.base().effects[index].values;
   const Eigen::VectorXf field =
       ImageFieldFunctions(side, side) *
       Eigen::Map<const Eigen::VectorXd>(values.data(), kImageFieldSize).cast<float>();
-  if (field.norm() / side > kFaint * selection->photographs->noise.sigma_grey) return absl::OkStatus();
+  if (field.norm() / side > kPhotoSearchRules.faint * selection->photographs->noise.sigma_grey)
+    return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(
       selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
   return absl::OkStatus();
@@ -213,7 +211,8 @@ absl::Status DropUnsteady(PhotoSelection* selection) {
     selection->covariance = CovarianceBetweenBlocks(*selection->fine.experiment, selection->fit);
     for (int index = static_cast<int>(selection->fit.model.base().effects.size()) - 1;
          index >= selection->initial_effects && !dropped; --index) {
-      if (engine::NeutralP(selection->fit.model, index, selection->fit.point, selection->covariance) < kStepP)
+      if (engine::NeutralP(selection->fit.model, index, selection->fit.point, selection->covariance) <
+          kPhotoSearchRules.step_p)
         continue;
       TOUCHSTONE_ASSIGN_OR_RETURN(
           selection->fit, engine::FitModel(*selection->fine.experiment, selection->fit.model.Without(index)));
@@ -235,7 +234,8 @@ absl::Status HoldChoices(PhotoSelection* selection) {
     for (int i = 0; i < held.size(); ++i) {
       if (held.parameters()[i].effect != e) continue;
       const double choice = std::round(point[i]);
-      is_choice &= std::abs(point[i] - choice) < kNearChoice && choice != held.parameters()[i].neutral;
+      is_choice &= std::abs(point[i] - choice) < kPhotoSearchRules.near_choice &&
+                   choice != held.parameters()[i].neutral;
       point[i] = choice;
     }
     held.MoveTo(point);

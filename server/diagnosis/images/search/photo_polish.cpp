@@ -6,20 +6,18 @@
 #include "server/base/status.h"
 #include "server/diagnosis/images/search/photo_quality.h"
 #include "server/diagnosis/images/search/photo_search.h"
+#include "server/diagnosis/images/search/rules.h"
 
 namespace touchstone::diagnosis::images {
-namespace {
-
-constexpr PhotoRowsOptions kPolish = {12544, 1, 100};
-
-}  // namespace
-
 absl::StatusOr<PolishRows> MakePolishRows(const Photographs& photographs, const engine::Fit& fit,
                                           const DiagnosisContext& context) {
   const model::Model& anchor = fit.model.base();
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<image::Photo> expected,
                               ExpectPhotographs(photographs, anchor, false, context.pool));
-  PhotoRowsOptions options = kPolish;
+  PhotoRowsOptions options;
+  options.cells = kPhotoSearchRules.fine_cells;
+  options.smoothing = kPhotoSearchRules.fine_smoothing;
+  options.max_photographs = kPhotoSearchRules.polish_photographs;
   options.contour_px2 = ContourPlaceVariance(photographs, expected, context.pool);
   PolishRows made;
   TOUCHSTONE_ASSIGN_OR_RETURN(made.search, MakePhotoSearch(photographs, anchor, {}, options, context));

@@ -11,19 +11,9 @@
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/images/pixels/photo_cells.h"
+#include "server/diagnosis/images/search/rules.h"
 
 namespace touchstone::diagnosis::images {
-namespace {
-
-constexpr int kPatches = 1600;           // of a picture
-constexpr double kVarianceKnown = 1.05;  // the noise's may be so much larger
-constexpr double kMinRepeatPixels = 1000;
-constexpr double kContours = 1.1;  // an error so many times the floor may come from contours alone
-constexpr double kMinPlacePx2 = 1e-4;
-constexpr double kHeldOutNear = 0.3;  // standard errors that a value may be off in a fit without a part
-constexpr double kEfficiency = 0.3;   // of a pixel of the residuals' differences, as a degree of freedom
-
-}  // namespace
 
 PixelNoise NoiseOfResiduals(const Photographs& p, const std::vector<image::Photo>& expected,
                             ThreadPool* pool) {
@@ -57,7 +47,7 @@ engine::NoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vect
     }
     floor.degrees_of_freedom += pixels * static_cast<double>(members.size() - 1);
   }
-  floor.from_repeats = floor.degrees_of_freedom >= kMinRepeatPixels;
+  floor.from_repeats = floor.degrees_of_freedom >= kPhotoSearchRules.min_repeat_pixels;
   if (floor.from_repeats) {
     floor.sigma = std::sqrt(squares / floor.degrees_of_freedom);
   } else {
@@ -65,7 +55,7 @@ engine::NoiseFloor NoiseFloorOfPhotographs(const Photographs& p, const std::vect
     double variance = 0;
     for (int k = 0; k < p.size(); ++k)
       for (const float grey : expected[k].grey) variance += record.Variance(grey);
-    floor.degrees_of_freedom = kEfficiency * pixels * p.size();
+    floor.degrees_of_freedom = kPhotoSearchRules.pixel_dof_share * pixels * p.size();
     floor.sigma = std::sqrt(variance / (pixels * std::max(p.size(), 1)));
   }
   const double share = kNormalQuantile975 / std::sqrt(2 * floor.degrees_of_freedom);
@@ -90,12 +80,13 @@ double ContourPlaceVariance(const Photographs& p, const std::vector<image::Photo
   });
   const double all = std::accumulate(squares.begin(), squares.end(), 0.0);
   if (!(all > 0)) return kUnknownPlacePx2;
-  return std::clamp(std::accumulate(excess.begin(), excess.end(), 0.0) / all, kMinPlacePx2, kUnknownPlacePx2);
+  return std::clamp(std::accumulate(excess.begin(), excess.end(), 0.0) / all,
+                    kPhotoSearchRules.min_place_px2.value(), kUnknownPlacePx2);
 }
 
 double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expected, int parameters,
                     ThreadPool* pool) {
-  const CellGrid grid = GridOfPicture(p.width(), p.height(), kPatches);
+  const CellGrid grid = GridOfPicture(p.width(), p.height(), kPhotoSearchRules.patches);
   std::vector<double> squares(p.size());
   ParallelFor(pool, p.size(), 1, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
@@ -109,7 +100,7 @@ double PatchMisfitP(const Photographs& p, const std::vector<image::Photo>& expec
   double sum = 0;
   for (const double square : squares) sum += square;
   const double freedom = static_cast<double>(grid.size()) * p.size() - parameters;
-  return ChiSquaredTail(sum / kVarianceKnown, freedom);
+  return ChiSquaredTail(sum / kPhotoSearchRules.variance_known, freedom);
 }
 
 engine::Quality QualityOfPhotographs(const Photographs& photographs,
@@ -122,8 +113,8 @@ engine::Quality QualityOfPhotographs(const Photographs& photographs,
 }
 
 void AssessByPixels(const Photographs& p, const engine::NoiseFloor& floor, engine::Quality* quality) {
-  const double freedom = kEfficiency * p.width() * p.height() * p.size();
-  const double ratio = quality->rmse / (kContours * floor.sigma);
+  const double freedom = kPhotoSearchRules.pixel_dof_share * p.width() * p.height() * p.size();
+  const double ratio = quality->rmse / (kPhotoSearchRules.contours * floor.sigma);
   if (!(floor.sigma > 0) || ratio <= 1) return;
   quality->lack_of_fit_p = std::min(quality->lack_of_fit_p, ChiSquaredTail(freedom * ratio * ratio, freedom));
 }
@@ -132,7 +123,7 @@ absl::StatusOr<double> HeldOutRatio(const Photographs& photographs, const PhotoR
                                     const engine::Experiment& experiment, const engine::Fit& fit) {
   if (fit.model.size() == 0) return 1;
   engine::Experiment nearly = experiment;
-  nearly.near_enough = kHeldOutNear;
+  nearly.near_enough = kPhotoSearchRules.held_out_near;
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<std::vector<engine::RefitWithoutPart>> divisions,
                               engine::RefitWithoutParts(nearly, fit));
   const auto squares_of = [&](const model::Model& model,

@@ -10,31 +10,30 @@
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/diagnosis/images/pixels/image_field.h"
 #include "server/diagnosis/images/search/photo_quality.h"
+#include "server/diagnosis/images/search/rules.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-// Exposure, optics and place may all be off at once: each of them alone hides what the others take.
-constexpr int kMaxTrialSteps = 2;
-// Noise of coarse rows, over that of pixels, from where pictures may lie tens of pixels off: kFar goes before kCoarse, where
-// the image field would take a displaced object for a stain. A focal length 8 % off gives 38, a principal point 30 of 224 px
-// off 190, 15 of 112 px off 48.
-constexpr double kFarSigma = 20;
-// Of that noise, the most that what kFar has found may leave: otherwise it was no displacement.
-constexpr double kFarLeaves = 0.5;
-// Displacements of several causes at once; what else is missing is found later.
-constexpr int kMaxFarSteps = 3;
-constexpr PhotoRowsOptions kFar = {196, 3, 15, kUnknownPlacePx2, kMaxTrialSteps, kMaxFarSteps};
-constexpr PhotoRowsOptions kCoarse = {1600, 2, 15, kUnknownPlacePx2, kMaxTrialSteps};
-constexpr PhotoRowsOptions kFine = {12544, 1, 30};
-constexpr int kCoarsePasses = 3;           // searches, each at what the one before has found
-constexpr double kMinDeclaredShare = 0.1;  // engine::SearchRules: gamma in the place of exposure has 0.02
-constexpr double kRestSigma = 3, kRestGain = 0.05;  // engine::SearchRules
-constexpr int kMaxRefits = 4, kMaxRareRefits = 2;
-constexpr int kAnchorPasses = 5;
-constexpr double kAnchorStays =
-    1;  // standard errors by which a value moves from an anchor that is near enough
+PhotoRowsOptions FarRows() {
+  PhotoRowsOptions options;
+  options.cells = kPhotoSearchRules.far_cells;
+  options.smoothing = kPhotoSearchRules.far_smoothing;
+  options.max_photographs = kPhotoSearchRules.coarse_photographs;
+  options.max_trial_steps = kPhotoSearchRules.max_trial_steps;
+  options.max_steps = kPhotoSearchRules.max_far_steps;
+  return options;
+}
+
+PhotoRowsOptions CoarseRows() {
+  PhotoRowsOptions options;
+  options.cells = kPhotoSearchRules.coarse_cells;
+  options.smoothing = kPhotoSearchRules.coarse_smoothing;
+  options.max_photographs = kPhotoSearchRules.coarse_photographs;
+  options.max_trial_steps = kPhotoSearchRules.max_trial_steps;
+  return options;
+}
 
 // Whether the explanation moves rays by more than the initial model does.
 bool MovesRaysBeyond(const engine::Explanation& explanation) {
@@ -48,10 +47,10 @@ bool MovesRaysBeyond(const engine::Explanation& explanation) {
 absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& context,
                         engine::Explanation* explanation) {
   if (!MovesRaysBeyond(*explanation)) return absl::OkStatus();
-  for (int pass = 0; pass < kAnchorPasses; ++pass) {
+  for (int pass = 0; pass < kPhotoSearchRules.anchor_passes; ++pass) {
     TOUCHSTONE_ASSIGN_OR_RETURN(
         const PhotoSearch there,
-        MakePhotoSearch(photographs, explanation->fit.model.base(), {}, kCoarse, context));
+        MakePhotoSearch(photographs, explanation->fit.model.base(), {}, CoarseRows(), context));
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit fit, engine::FitModel(*there.experiment, explanation->fit.model));
     double farthest = 0;  // standard errors
     for (int i = 0; i < fit.model.size(); ++i)
@@ -59,7 +58,7 @@ absl::Status MoveAnchor(const Photographs& photographs, const DiagnosisContext& 
         farthest = std::max(
             farthest, std::abs(fit.point[i] - explanation->fit.point[i]) / std::sqrt(fit.covariance(i, i)));
     explanation->fit = std::move(fit);
-    if (farthest < kAnchorStays) break;
+    if (farthest < kPhotoSearchRules.anchor_stays) break;
   }
   return absl::OkStatus();
 }
@@ -81,24 +80,24 @@ absl::StatusOr<engine::Explanation> ExplainCoarsely(const DiagnosisInput& input,
     made->experiment->update_derivatives = true;
     return made;
   };
-  TOUCHSTONE_ASSIGN_OR_RETURN(PhotoSearch coarse, search(kCoarse, candidates));
+  TOUCHSTONE_ASSIGN_OR_RETURN(PhotoSearch coarse, search(CoarseRows(), candidates));
   TOUCHSTONE_ASSIGN_OR_RETURN(
       explanation.fit,
       engine::FitModel(*coarse.experiment, engine::Parameterization(*input.model, photographs.objects)));
-  if (explanation.fit.sigma > kFarSigma) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch far, search(kFar, NamedOfRig(candidates)));
+  if (explanation.fit.sigma > kPhotoSearchRules.far_sigma) {
+    TOUCHSTONE_ASSIGN_OR_RETURN(const PhotoSearch far, search(FarRows(), NamedOfRig(candidates)));
     TOUCHSTONE_ASSIGN_OR_RETURN(engine::Explanation found, far.search->Continue(explanation));
     TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &found));
-    if (MovesRaysBeyond(found) && found.fit.sigma < kFarLeaves * explanation.fit.sigma) {
+    if (MovesRaysBeyond(found) && found.fit.sigma < kPhotoSearchRules.far_leaves * explanation.fit.sigma) {
       explanation = std::move(found);
       anchor = explanation.fit.model.base();
-      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(kCoarse, candidates));
+      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(CoarseRows(), candidates));
     }
   }
-  for (int pass = 0; pass < kCoarsePasses; ++pass) {
+  for (int pass = 0; pass < kPhotoSearchRules.coarse_passes; ++pass) {
     const size_t had = explanation.fit.model.base().effects.size();
     if (pass > 0) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(kCoarse, candidates));
+      TOUCHSTONE_ASSIGN_OR_RETURN(coarse, search(CoarseRows(), candidates));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(explanation, coarse.search->Continue(explanation));
     TOUCHSTONE_RETURN_IF_ERROR(MoveAnchor(photographs, context, &explanation));
@@ -129,10 +128,10 @@ absl::StatusOr<PhotoSearch> MakePhotoSearch(const Photographs& photographs, cons
   engine::SearchRules rules;
   rules.cv_gain_over_noise = true;
   // A fit of photographs takes a second: where nothing explains them, fits of what might are most of a diagnosis.
-  rules.max_refits = kMaxRefits;
-  rules.max_rare_refits = kMaxRareRefits;
-  rules.min_declared_share = kMinDeclaredShare;
-  rules.rest_sigma = kRestSigma, rules.rest_cv_gain = kRestGain;
+  rules.max_refits = kPhotoSearchRules.max_refits;
+  rules.max_rare_refits = kPhotoSearchRules.max_rare_refits;
+  rules.min_declared_share = kPhotoSearchRules.min_declared_share;
+  rules.rest_sigma = kPhotoSearchRules.rest_sigma, rules.rest_cv_gain = kPhotoSearchRules.rest_gain;
   rules.max_trial_steps = options.max_trial_steps;
   rules.max_steps = options.max_steps;
   made.search = std::make_unique<engine::StepwiseSearch>(*made.experiment, candidates, rules,
@@ -145,7 +144,7 @@ RowsMisfit MisfitOfRows(const PhotoSearch& search, const engine::Fit& fit) {
   const double q = likelihood.Gram(likelihood.Prepare(fit.columns.values.col(0)), fit.hypothesis)(0, 0);
   const double freedom = std::max(search.rows->rows() - fit.model.size(), 1);
   return {std::sqrt(q / freedom), ChiSquaredTail(q, freedom),
-          ChiSquaredTail(q / (kMisfitRows * kMisfitRows), freedom)};
+          ChiSquaredTail(q / (kPhotoSearchRules.misfit_rows * kPhotoSearchRules.misfit_rows), freedom)};
 }
 
 namespace {
@@ -167,13 +166,12 @@ absl::StatusOr<double> LackOfFitP(const Photographs& photographs, const PhotoSel
 absl::StatusOr<engine::TriedPValues> TryOnPictures(const Photographs& photographs,
                                                    const PhotoSelection& selection, const model::Model& given,
                                                    uint64_t seed, ThreadPool* pool) {
-  constexpr size_t kMinPictures = 8;
   const PhotoSearch& search = selection.fine;
   const PhotoRows& rows = *search.rows;
   std::vector<int> pictures;
   for (int row = 0; row < rows.rows(); ++row)
     if (row == 0 || rows.PhotographOfRow(row) != rows.PhotographOfRow(row - 1)) pictures.push_back(row);
-  if (pictures.size() < kMinPictures) return engine::TriedPValues();
+  if (pictures.size() < kPhotoSearchRules.min_tried_pictures) return engine::TriedPValues();
   pictures.push_back(rows.rows());
   TOUCHSTONE_ASSIGN_OR_RETURN(const engine::GivenAndEffects tried,
                               engine::ColumnsOfEffects(*search.search, given));
@@ -198,7 +196,10 @@ absl::Status PrepareFine(const Photographs& photographs, const engine::Fit& coar
                               ExpectPhotographs(photographs, coarse.model.base(), false, context.pool));
   selection->photographs->noise = NoiseOfResiduals(photographs, expected, context.pool);
   selection->photographs->record = std::make_shared<const RecordTable>(selection->photographs->noise);
-  PhotoRowsOptions options = kFine;
+  PhotoRowsOptions options;
+  options.cells = kPhotoSearchRules.fine_cells;
+  options.smoothing = kPhotoSearchRules.fine_smoothing;
+  options.max_photographs = kPhotoSearchRules.fine_photographs;
   options.contour_px2 = ContourPlaceVariance(*selection->photographs, expected, context.pool);
   TOUCHSTONE_ASSIGN_OR_RETURN(selection->fine, MakePhotoSearch(*selection->photographs, coarse.model.base(),
                                                                candidates, options, context));

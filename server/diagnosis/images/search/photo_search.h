@@ -104,11 +104,10 @@ absl::Status KeepStepsWithGain(const Photographs& photographs, const DiagnosisCo
                                PhotoSelection* selection);
 
 // What a fit leaves of the rows of its search.
-inline constexpr double kMisfitRows = 1.1;  // RowsMisfit::in_noise from which a rest counts
 struct RowsMisfit {
   double in_noise = 0;  // root mean square
   double p = 1;         // that noise leaves so much,
-  double p_counts = 1;  // ... and that noise kMisfitRows times as large does
+  double p_counts = 1;  // ... and that noise PhotoSearchRules::misfit_rows times as large does
 };
 RowsMisfit MisfitOfRows(const PhotoSearch& search, const engine::Fit& fit);
 

@@ -9,22 +9,15 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
+#include "server/diagnosis/images/rules.h"
 #include "server/diagnosis/images/terms/photo_rest_sums.h"
 #include "server/diagnosis/images/terms/photo_term_scores.h"
 #include "server/diagnosis/images/terms/photo_terms.h"
+#include "server/diagnosis/images/terms/rules.h"
 #include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr double kPickedNats = 11;       // of a term that was picked from a dictionary
-constexpr double kEnterNats = 4.5;       // beyond what is paid
-constexpr double kSuggestP = 1e-4;       // all terms and curves paid for
-constexpr double kMinHeld = 0.5;         // of what is taken where it was fitted, that unseen poses lose too
-constexpr double kOfNameless = 0.8;      // of what the nameless competitor takes from unseen poses
-constexpr double kMinExcess = 0.2;       // of the excess error, that a suggestion takes
-constexpr double kFormulaOfCurve = 0.9;  // of what a curve takes, from where a formula says the same
-constexpr size_t kMaxTried = 4;          // formulas that are simulated
 
 absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurve(const CurveAxis& axis, const AxisRange& range,
                                                                const Eigen::VectorXd& values) {
@@ -37,8 +30,9 @@ absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurve(const CurveAxis& 
   const auto short_number = [](double value) {
     return std::strtod(absl::StrFormat("%.4g", value).c_str(), nullptr);
   };
-  for (int n = 0; n < kCurveKnots; ++n) {
-    spec.knots.push_back(short_number(range.low + (range.high - range.low) * n / (kCurveKnots - 1)));
+  for (int n = 0; n < kPhotoTermRules.curve_knots; ++n) {
+    spec.knots.push_back(
+        short_number(range.low + (range.high - range.low) * n / (kPhotoTermRules.curve_knots - 1)));
     spec.values[0].push_back(short_number(values[n]));
   }
   return effects::MakeLookupEffect(spec);
@@ -52,9 +46,10 @@ class RestSearch {
 
   // Whether chance hardly brings it about and what it was not fitted to bears it out.
   static bool Holds(const TermScore& score, double paid_nats, double tries, double nameless) {
-    return score.determined && score.gain_nats - paid_nats > kEnterNats && score.p * tries < kSuggestP &&
-           score.every_object && score.taken_unseen > kMinHeld * score.taken &&
-           score.taken_unseen > kOfNameless * nameless;
+    return score.determined && score.gain_nats - paid_nats > kPhotoTermRules.enter_nats &&
+           score.p * tries < kImageRules.rest_p && score.every_object &&
+           score.taken_unseen > kPhotoTermRules.min_held * score.taken &&
+           score.taken_unseen > kPhotoTermRules.of_nameless * nameless;
   }
 
   // The errors with the effect as comparisons find them; none where it takes too little.
@@ -77,7 +72,7 @@ class RestSearch {
     if (!(before2 > floor2)) return none;
     tried.heldout_rmse = std::sqrt(after2);
     tried.heldout_gain = std::clamp((before2 - after2) / (before2 - floor2), 0.0, 1.0);
-    if (tried.heldout_gain < kMinExcess) return none;
+    if (tried.heldout_gain < kPhotoTermRules.min_excess) return none;
     model::Model only = model_;
     const std::string yaml = engine::EffectYaml(only, std::move(instance));
     (effect->formula != nullptr ? tried.formula_yaml : tried.lookup_yaml) = yaml;
@@ -124,14 +119,14 @@ absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& 
   std::vector<TermScore> scores;
   for (size_t t = 0; t < dictionary.terms.size(); ++t) {
     scores.push_back(sums.ScoreTerm(t));
-    const double paid = kPickedNats + dictionary.terms[t].penalty_nats;
+    const double paid = kPhotoTermRules.picked_nats + dictionary.terms[t].penalty_nats;
     if (RestSearch::Holds(scores[t], paid, tries, nameless))
       order.emplace_back(scores[t].gain_nats - paid, t);
   }
   std::stable_sort(order.begin(), order.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::optional<RestSuggestion> formula;
-  for (size_t n = 0; n < std::min(order.size(), kMaxTried); ++n) {
+  for (size_t n = 0; n < std::min(order.size(), kPhotoTermRules.max_tried.value()); ++n) {
     const size_t t = order[n].second;
     const TermScore& score = scores[t];
     TOUCHSTONE_ASSIGN_OR_RETURN(
@@ -144,8 +139,10 @@ absl::StatusOr<std::optional<RestSuggestion>> SuggestForRest(const Photographs& 
     tried->follows = {dictionary.terms[t].covariate, std::min(score.p * tries, 1.0), order[n].first};
     formula = std::move(tried);
   }
-  return formula && (!curve || formula->heldout_gain >= kFormulaOfCurve * curve->heldout_gain) ? formula
-                                                                                               : curve;
+  return formula &&
+                 (!curve || formula->heldout_gain >= kPhotoTermRules.formula_of_curve * curve->heldout_gain)
+             ? formula
+             : curve;
 }
 
 }  // namespace touchstone::diagnosis::images

@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "server/diagnosis/images/pixels/photo_cells.h"
+#include "server/diagnosis/images/rules.h"
+#include "server/diagnosis/images/terms/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
 
-constexpr double kMaxPixels = 250'000;  // of all photographs, that sums are taken over
-constexpr double kPriorGrey = 10;       // of what a term or a curve adds
-constexpr int kMapSide = 12, kPlaceSide = 6;
 constexpr double kBends[kCurveBends] = {1, 4, 16};  // grey levels: of a curve's second differences
 
 // Pixels of one photograph that take part: every `stride`-th along both axes, on alternating places.
@@ -27,7 +26,7 @@ RestSums::RestSums(const Photographs& photographs, const model::Model& model,
                    ThreadPool* pool)
     : p_(photographs), model_(model), expected_(expected), dictionary_(dictionary) {
   const double pixels = static_cast<double>(p_.width()) * p_.height() * p_.size();
-  stride_ = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kMaxPixels))));
+  stride_ = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kPhotoTermRules.max_pixels))));
   FindRanges();
   std::vector<PhotoSums> of_photo(p_.size());
   ParallelFor(pool, p_.size(), 1, [&](int begin, int end) {
@@ -48,9 +47,11 @@ TermScore RestSums::ScoreTerm(size_t t) const {
     poses.push_back(pose.terms[t]);
     squares += pose.terms[t].squares.diagonal();
   }
-  // Wide enough that each column may add kPriorGrey, root mean square.
+  // Wide enough that each column may add prior_grey, root mean square.
   const Eigen::MatrixXd precision =
-      (squares.array().max(1e-300) / (weight_ * kPriorGrey * kPriorGrey)).matrix().asDiagonal();
+      (squares.array().max(1e-300) / (weight_ * kPhotoTermRules.prior_grey * kPhotoTermRules.prior_grey))
+          .matrix()
+          .asDiagonal();
   return ScoreSums(poses, objects_, precision);
 }
 
@@ -60,9 +61,10 @@ TermScore RestSums::ScoreCurve(size_t axis) const {
   TermScore best;
   for (const double bend : kBends) {
     Eigen::MatrixXd precision =
-        Eigen::MatrixXd::Identity(kCurveKnots, kCurveKnots) / (kCurveKnots * kPriorGrey * kPriorGrey);
-    for (int n = 1; n + 1 < kCurveKnots; ++n) {
-      Eigen::VectorXd second = Eigen::VectorXd::Zero(kCurveKnots);
+        Eigen::MatrixXd::Identity(kPhotoTermRules.curve_knots, kPhotoTermRules.curve_knots) /
+        (kPhotoTermRules.curve_knots * kPhotoTermRules.prior_grey * kPhotoTermRules.prior_grey);
+    for (int n = 1; n + 1 < kPhotoTermRules.curve_knots; ++n) {
+      Eigen::VectorXd second = Eigen::VectorXd::Zero(kPhotoTermRules.curve_knots);
       second[n - 1] = second[n + 1] = 1, second[n] = -2;
       precision += second * second.transpose() / (bend * bend);
     }
@@ -75,14 +77,14 @@ TermScore RestSums::ScoreCurve(size_t axis) const {
 double RestSums::Nameless() const {
   std::vector<Eigen::VectorXd> squares, cross;
   for (const PhotoSums& pose : sums_) squares.push_back(pose.map_squares), cross.push_back(pose.map_cross);
-  const double in_picture = UnseenOfMeans(squares, cross, kPriorGrey);
+  const double in_picture = UnseenOfMeans(squares, cross, kPhotoTermRules.prior_grey);
   double on_objects = 0;
   for (size_t object = 0; object < p_.objects.size(); ++object) {
     squares.clear(), cross.clear();
     for (size_t g = 0; g < sums_.size(); ++g)
       if (objects_[g] == static_cast<int>(object))
         squares.push_back(sums_[g].place_squares), cross.push_back(sums_[g].place_cross);
-    on_objects += UnseenOfMeans(squares, cross, kPriorGrey);
+    on_objects += UnseenOfMeans(squares, cross, kPhotoTermRules.prior_grey);
   }
   return std::max(in_picture, on_objects);
 }
@@ -94,10 +96,12 @@ RestSums::PhotoSums RestSums::Empty() const {
     sums.terms.push_back({Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
   }
   for (size_t axis = 0; axis < kCurveAxisCount; ++axis)
-    sums.curves.push_back(
-        {Eigen::MatrixXd::Zero(kCurveKnots, kCurveKnots), Eigen::VectorXd::Zero(kCurveKnots)});
-  sums.map_squares = sums.map_cross = Eigen::VectorXd::Zero(kMapSide * kMapSide);
-  sums.place_squares = sums.place_cross = Eigen::VectorXd::Zero(kPlaceSide * kPlaceSide * kPlaceSide);
+    sums.curves.push_back({Eigen::MatrixXd::Zero(kPhotoTermRules.curve_knots, kPhotoTermRules.curve_knots),
+                           Eigen::VectorXd::Zero(kPhotoTermRules.curve_knots)});
+  sums.map_squares = sums.map_cross =
+      Eigen::VectorXd::Zero(kPhotoTermRules.map_cells * kPhotoTermRules.map_cells);
+  sums.place_squares = sums.place_cross =
+      Eigen::VectorXd::Zero(kImageRules.object_cells * kImageRules.object_cells * kImageRules.object_cells);
   return sums;
 }
 
@@ -158,14 +162,16 @@ RestSums::PhotoSums RestSums::Sum(int k) const {
     for (size_t axis = 0; axis < kCurveAxisCount; ++axis)
       if (ranges_[axis].usable())
         AddToCurve(ranges_[axis], kCurveAxes[axis].value(pixel), weight, residual, &sums.curves[axis]);
-    const int cell = y * kMapSide / p_.height() * kMapSide + x * kMapSide / p_.width();
+    const int cell = y * kPhotoTermRules.map_cells / p_.height() * kPhotoTermRules.map_cells +
+                     x * kPhotoTermRules.map_cells / p_.width();
     sums.map_squares[cell] += weight, sums.map_cross[cell] += weight * residual;
     if (photo.mask[at] == 0) return;
     int place = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const double extent = std::max(bounds.max_m[axis] - bounds.min_m[axis], 1e-9);
       const double share = (photo.point_m[at][axis] - bounds.min_m[axis]) / extent;
-      place = place * kPlaceSide + std::clamp(static_cast<int>(share * kPlaceSide), 0, kPlaceSide - 1);
+      place = place * kImageRules.object_cells +
+              std::clamp(static_cast<int>(share * kImageRules.object_cells), 0, kImageRules.object_cells - 1);
     }
     sums.place_squares[place] += weight, sums.place_cross[place] += weight * residual;
   });
@@ -174,9 +180,9 @@ RestSums::PhotoSums RestSums::Sum(int k) const {
 
 void RestSums::AddToCurve(const AxisRange& range, double value, double weight, double residual,
                           PoseSums* sum) {
-  const double place =
-      std::clamp((value - range.low) / (range.high - range.low), 0.0, 1.0) * (kCurveKnots - 1);
-  const int below = std::min(static_cast<int>(place), kCurveKnots - 2);
+  const double place = std::clamp((value - range.low) / (range.high - range.low), 0.0, 1.0) *
+                       (kPhotoTermRules.curve_knots - 1);
+  const int below = std::min(static_cast<int>(place), kPhotoTermRules.curve_knots - 2);
   const double share[2] = {below + 1 - place, place - below};
   for (int i = 0; i < 2; ++i) {
     sum->cross[below + i] += weight * share[i] * residual;

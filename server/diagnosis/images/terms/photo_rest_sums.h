@@ -11,10 +11,11 @@
 #include "server/diagnosis/images/photographs.h"
 #include "server/diagnosis/images/terms/photo_term_scores.h"
 #include "server/diagnosis/images/terms/photo_terms.h"
+#include "server/diagnosis/images/terms/rules.h"
 
 namespace touchstone::diagnosis::images {
 
-inline constexpr int kCurveKnots = 9, kCurveBends = 3;  // of a curve; stiffnesses that are tried
+inline constexpr int kCurveBends = 3;  // stiffnesses of a curve that are tried
 
 // What a curve may run along.
 struct CurveAxis {

@@ -7,12 +7,11 @@
 #include <set>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/images/rules.h"
+#include "server/diagnosis/images/terms/rules.h"
 
 namespace touchstone::diagnosis::images {
 namespace {
-
-constexpr size_t kUnseenFolds = 5;
-constexpr double kMinReciprocalCondition = 1e-10;  // of scaled columns
 
 // Columns of very different sizes are scaled before they are solved for.
 struct ScaledSolver {
@@ -27,7 +26,7 @@ struct ScaledSolver {
       scale[i] = 1 / std::sqrt(scale[i]);
     }
     ldlt.compute(scale.asDiagonal() * matrix * scale.asDiagonal());
-    good = ldlt.info() == Eigen::Success && ldlt.rcond() > kMinReciprocalCondition;
+    good = ldlt.info() == Eigen::Success && ldlt.rcond() > kPhotoTermRules.min_reciprocal_condition;
   }
   Eigen::VectorXd Solve(const Eigen::VectorXd& right) const {
     return scale.cwiseProduct(ldlt.solve(scale.cwiseProduct(right)));
@@ -79,14 +78,15 @@ TermScore ScoreSums(const std::vector<PoseSums>& poses, const std::vector<int>& 
   score.gain_nats = 0.5 * all.cross.dot(score.values) / spread - 0.5 * (log_det(both) - log_det(prior));
   score.p = ChiSquaredTail(all.cross.dot(least) / spread, p);
 
-  for (size_t fold = 0; fold < kUnseenFolds; ++fold) {
+  const size_t folds = kImageRules.folds;
+  for (size_t fold = 0; fold < folds; ++fold) {
     PoseSums seen = all;
-    for (size_t g = fold; g < poses.size(); g += kUnseenFolds)
+    for (size_t g = fold; g < poses.size(); g += folds)
       seen.squares -= poses[g].squares, seen.cross -= poses[g].cross;
     const ScaledSolver others(seen.squares + spread * precision);
     if (!others.good) continue;
     const Eigen::VectorXd values = others.Solve(seen.cross);
-    for (size_t g = fold; g < poses.size(); g += kUnseenFolds) score.taken_unseen += Taken(poses[g], values);
+    for (size_t g = fold; g < poses.size(); g += folds) score.taken_unseen += Taken(poses[g], values);
   }
   const std::set<int> names(objects.begin(), objects.end());
   score.every_object = true;
@@ -119,9 +119,10 @@ double UnseenOfMeans(const std::vector<Eigen::VectorXd>& squares, const std::vec
   }
   const double spread = std::max(scatter / std::max(seen_cells, 1.0), 1.0);
   double taken = 0;
-  for (size_t fold = 0; fold < kUnseenFolds; ++fold) {
+  const size_t folds = kImageRules.folds;
+  for (size_t fold = 0; fold < folds; ++fold) {
     Eigen::ArrayXd own_squares = Eigen::ArrayXd::Zero(cells), own_cross = Eigen::ArrayXd::Zero(cells);
-    for (size_t g = fold; g < squares.size(); g += kUnseenFolds)
+    for (size_t g = fold; g < squares.size(); g += folds)
       own_squares += squares[g].array(), own_cross += cross[g].array();
     const Eigen::ArrayXd means =
         (all_cross - own_cross) / (all_squares - own_squares + spread / (size * size));

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "server/base/units.h"
+#include "server/diagnosis/images/terms/rules.h"
 #include "server/effects/formula/formula.h"
 #include "server/image/photograph/simulate_photo.h"
 
@@ -15,9 +16,6 @@ namespace touchstone::diagnosis::images {
 namespace {
 
 using Pixel = effects::PhotoPixel;
-
-constexpr double kCurvedPhotoNats = 1.5, kWaveNats = 3;  // beyond what a straight line costs
-constexpr int kMaxWaves = 10;                            // over the picture's height or width, or the session
 
 double FourDigits(double value) {
   return std::strtod(absl::StrFormat("%.4g", value).c_str(), nullptr);
@@ -30,25 +28,26 @@ class TermLister {
     const double height = photographs.height(), width = photographs.width();
     Plain("radius", "radius", 0, [](const Pixel& p) { return p.radius; });
     Plain("radius", "radius^2", 0, [](const Pixel& p) { return p.radius * p.radius; });
-    Plain("radius", "radius^4", kCurvedPhotoNats, [](const Pixel& p) { return std::pow(p.radius, 4); });
+    Plain("radius", "radius^4", kPhotoTermRules.curved_nats,
+          [](const Pixel& p) { return std::pow(p.radius, 4); });
     Plain("row", "row", 0, [](const Pixel& p) { return p.row; });
     Plain("column", "column", 0, [](const Pixel& p) { return p.column; });
     const std::string mid_row = absl::StrCat(0.5 * height), mid_column = absl::StrCat(0.5 * width);
-    Plain("row", absl::StrCat("(row - ", mid_row, ")^2"), kCurvedPhotoNats,
+    Plain("row", absl::StrCat("(row - ", mid_row, ")^2"), kPhotoTermRules.curved_nats,
           [mid = 0.5 * height](const Pixel& p) { return (p.row - mid) * (p.row - mid); });
-    Plain("column", absl::StrCat("(column - ", mid_column, ")^2"), kCurvedPhotoNats,
+    Plain("column", absl::StrCat("(column - ", mid_column, ")^2"), kPhotoTermRules.curved_nats,
           [mid = 0.5 * width](const Pixel& p) { return (p.column - mid) * (p.column - mid); });
     Plain(
         "grey", "grey", 0, [](const Pixel& p) { return p.grey; }, false);
     Plain(
-        "grey", "grey^2", kCurvedPhotoNats, [](const Pixel& p) { return p.grey * p.grey; }, false);
+        "grey", "grey^2", kPhotoTermRules.curved_nats, [](const Pixel& p) { return p.grey * p.grey; }, false);
     Plain("incidence_deg", "incidence_deg", 0, [](const Pixel& p) { return p.incidence_deg; });
     Plain("incidence_deg", "cos(incidence_deg*pi/180)", 0,
           [](const Pixel& p) { return std::cos(p.incidence_deg * kRadiansPerDegree); });
-    Plain("incidence_deg", "cos(incidence_deg*pi/180)^2", kCurvedPhotoNats,
+    Plain("incidence_deg", "cos(incidence_deg*pi/180)^2", kPhotoTermRules.curved_nats,
           [](const Pixel& p) { return std::pow(std::cos(p.incidence_deg * kRadiansPerDegree), 2); });
     Plain("depth_mm", "depth_mm", 0, [](const Pixel& p) { return p.depth_mm; });
-    for (int waves = 1; waves <= kMaxWaves; ++waves) {
+    for (int waves = 1; waves <= kPhotoTermRules.max_waves; ++waves) {
       Wave("row", height / waves, [](const Pixel& p) { return p.row; });
       Wave("column", width / waves, [](const Pixel& p) { return p.column; });
     }
@@ -75,9 +74,10 @@ class TermLister {
       const int f = Function([tau](const Pixel& p) { return std::exp(-p.session_time_s / tau); });
       for (const bool grey : {false, true})
         for (const bool constant : {false, true})
-          Add("session_time_s", "exp(-session_time_s/tau)", f, grey, constant, kCurvedPhotoNats, "tau", tau);
+          Add("session_time_s", "exp(-session_time_s/tau)", f, grey, constant, kPhotoTermRules.curved_nats,
+              "tau", tau);
     }
-    for (int waves = 1; waves <= kMaxWaves; ++waves)
+    for (int waves = 1; waves <= kPhotoTermRules.max_waves; ++waves)
       Wave("session_time_s", (last - first) / waves, [](const Pixel& p) { return p.session_time_s; });
   }
 
@@ -103,7 +103,7 @@ class TermLister {
     }
     term.fixed_name = fixed_name;
     term.fixed_value = fixed_value;
-    term.penalty_nats = penalty + (grey ? kCurvedPhotoNats : 0);
+    term.penalty_nats = penalty + (grey ? kPhotoTermRules.curved_nats.value() : 0);
     dictionary_.terms.push_back(std::move(term));
   }
 
@@ -122,7 +122,7 @@ class TermLister {
       term.columns = {{sine, grey}, {cosine, grey}};
       term.fixed_name = "period";
       term.fixed_value = period;
-      term.penalty_nats = kWaveNats + (grey ? kCurvedPhotoNats : 0);
+      term.penalty_nats = kPhotoTermRules.wave_nats + (grey ? kPhotoTermRules.curved_nats.value() : 0);
       dictionary_.terms.push_back(std::move(term));
     }
   }
