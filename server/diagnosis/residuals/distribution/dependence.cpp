@@ -6,13 +6,10 @@
 
 #include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/distribution/permutation.h"
+#include "server/diagnosis/residuals/distribution/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kMaxPosesPermuted = 20000;
-constexpr int kRowPermutations = 200;
-constexpr double kVariesWithinPoses = 0.25;  // share of the covariate's variation that lies within poses
 
 // What changes places as a whole: a pose with all of its repeats, or one touch. Bin (-1: none) and residual
 // (NaN: none) of each finger.
@@ -52,7 +49,7 @@ bool VariesWithinPoses(const std::vector<ResidualCell>& cells, int fingers) {
       if (count[i] > 0) within += squares[i] - sum[i] * sum[i] / count[i];
   });
   const double all = all_squares - all_sum * all_sum / std::max<size_t>(1, cells.size());
-  return within > kVariesWithinPoses * all;
+  return within > kDistributionRules.within_poses * all;
 }
 
 // Means of the fingers over one pose; NaN for a finger without cells.
@@ -77,7 +74,7 @@ PoseMeans MeansOf(const std::vector<ResidualCell>& cells, size_t begin, size_t e
 ExchangeableUnits PosesAsUnits(const std::vector<ResidualCell>& cells, const std::vector<double>& ends,
                                int fingers) {
   ExchangeableUnits result;
-  ForPoses(cells, kMaxPosesPermuted, [&](size_t begin, size_t end) {
+  ForPoses(cells, static_cast<int>(kDistributionRules.max_poses.value()), [&](size_t begin, size_t end) {
     const PoseMeans means = MeansOf(cells, begin, end, fingers);
     result.units.push_back({std::vector<int>(fingers, -1), means.residual_s});
     for (int i = 0; i < fingers; ++i)
@@ -97,7 +94,7 @@ ExchangeableUnits PosesAsUnits(const std::vector<ResidualCell>& cells, const std
 ExchangeableUnits TouchesAsUnits(const std::vector<ResidualCell>& cells, const std::vector<double>& ends,
                                  int fingers) {
   ExchangeableUnits result;
-  ForPoses(cells, kMaxPosesPermuted, [&](size_t begin, size_t end) {
+  ForPoses(cells, static_cast<int>(kDistributionRules.max_poses.value()), [&](size_t begin, size_t end) {
     const PoseMeans means = MeansOf(cells, begin, end, fingers);
     const int first_unit = static_cast<int>(result.units.size());
     for (size_t c = begin; c < end; ++c) {
@@ -151,7 +148,7 @@ double DependenceP(const std::vector<ResidualCell>& cells, const std::vector<dou
   std::vector<double> sums;
   const double observed = BetweenBinSquares(units, source, fingers, bins, &sums);
   RandomStream random(seed, RandomDomain::kDiagnosis, number, 3);
-  std::vector<double> permuted(kRowPermutations);
+  std::vector<double> permuted(kDistributionRules.dependence_permutations.value());
   for (double& value : permuted) {
     for (const auto& [begin, end] : blocks)
       for (int u = end - 1; u > begin; --u) std::swap(source[u], source[begin + random.Below(u - begin + 1)]);

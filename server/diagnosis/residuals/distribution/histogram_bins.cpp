@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/residuals/distribution/rules.h"
+
 namespace touchstone::diagnosis::residuals {
 
 std::vector<double> HistogramEdges(std::vector<double> pooled) {
@@ -18,7 +20,7 @@ std::vector<double> HistogramEdges(std::vector<double> pooled) {
   }
   double width = 2 * (quantile(0.75) - quantile(0.25)) / std::cbrt(static_cast<double>(pooled.size()));
   // Two bins are kept for the rounding outwards.
-  width = std::max(width, (high - low) / (kMaxHistogramBins - 2));
+  width = std::max(width, (high - low) / (kDistributionRules.max_bins - 2));
   const double power = std::pow(10, std::floor(std::log10(width)));
   double step = 10 * power;
   for (const double factor : {5.0, 2.0, 1.0})

@@ -6,8 +6,6 @@
 
 namespace touchstone::diagnosis::residuals {
 
-inline constexpr int kMaxHistogramBins = 60;
-
 // kDescriptor: contact times relative to the first finger's, in us. kCurvature: local curvature
 // speed * (t_l - 2 t_m + t_r) / spacing^2 of three fingers, in 1/m, positive where the surface is convex.
 enum class HistogramQuantity { kDescriptor, kCurvature };
@@ -24,7 +22,7 @@ struct ComparedHistogram {
 
 // Common edges for the values of all samples together: bins of the width of Freedman and Diaconis (1981),
 // rounded to a readable number, over the range that holds all but the outermost thousandth at either end. At
-// most kMaxHistogramBins bins. Empty if there are no values.
+// most DistributionRules::max_bins bins. Empty if there are no values.
 std::vector<double> HistogramEdges(std::vector<double> pooled);
 
 // Density of `values` over the bins, 1 / unit: the share of *all* values in a bin, over its width.

@@ -7,11 +7,10 @@
 #include "server/base/numbers/random.h"
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/distribution/permutation.h"
+#include "server/diagnosis/residuals/distribution/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr size_t kMaxPlotted = 200000;  // values of each sample whose quantiles set the edges
 
 // Values of one quantity under measurement and both models; pose and object of each.
 struct ComparedSample {
@@ -94,7 +93,7 @@ std::vector<ComparedSample> ByObject(const ComparedSample& all, int objects) {
 }
 
 std::vector<double> Thinned(const std::vector<double>& values) {
-  const size_t step = 1 + values.size() / kMaxPlotted;
+  const size_t step = 1 + values.size() / kDistributionRules.max_plotted;
   std::vector<double> some;
   for (size_t n = 0; n < values.size(); n += step) some.push_back(values[n]);
   return some;

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/residuals/distribution/rules.h"
+
 namespace touchstone::diagnosis::residuals {
-namespace {
-
-constexpr size_t kMaxParityPoints = 2000;
-
-}  // namespace
 
 std::vector<ParityPoint> MakeParity(const touches::Observations& observations,
                                     const touches::Prediction& initial, const std::vector<double>& before,
@@ -19,7 +16,7 @@ std::vector<ParityPoint> MakeParity(const touches::Observations& observations,
     if (observations.used[k])
       for (int i = 0; i < fingers; ++i)
         if (!std::isnan(before[size_t(k) * fingers + i])) cells.push_back(size_t(k) * fingers + i);
-  const size_t count = std::min(kMaxParityPoints, cells.size());
+  const size_t count = std::min(kDistributionRules.max_parity_points.value(), cells.size());
   std::vector<ParityPoint> points;
   for (size_t n = 0; n < count; ++n) {
     // Evenly over the session; the finger changes from point to point.

@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/residuals/distribution/rules.h"
+#include "server/diagnosis/residuals/rules.h"
 
 namespace touchstone::diagnosis::residuals {
-namespace {
-
-constexpr size_t kMaxPosesTested = 20000;
-constexpr int kPermutations = 499;
-constexpr int kRanks = 256;  // into how many parts the test sorts the values
-
-}  // namespace
 
 double ChiSquareTail(double x, double dof) {
   if (x <= 0) return 1;
@@ -46,7 +41,8 @@ double PosePermutationP(const std::vector<double>& a, const std::vector<double>&
   pooled.insert(pooled.end(), b.begin(), b.end());
   std::sort(pooled.begin(), pooled.end());
   std::vector<double> ends;
-  for (int r = 1; r < kRanks; ++r) ends.push_back(pooled[pooled.size() * r / kRanks]);
+  for (int r = 1; r < kDistributionRules.ranks; ++r)
+    ends.push_back(pooled[pooled.size() * r / kDistributionRules.ranks]);
   const auto rank = [&](double value) {
     return static_cast<int>(std::upper_bound(ends.begin(), ends.end(), value) - ends.begin());
   };
@@ -61,9 +57,9 @@ double PosePermutationP(const std::vector<double>& a, const std::vector<double>&
   std::vector<size_t> pose_end;
   for (size_t n = 1; n <= pairs.size(); ++n)
     if (n == pairs.size() || pairs[n].pose != pairs[n - 1].pose) pose_end.push_back(n);
-  if (pose_end.size() > kMaxPosesTested) pose_end.resize(kMaxPosesTested);
+  if (pose_end.size() > kDistributionRules.max_poses) pose_end.resize(kDistributionRules.max_poses);
 
-  std::vector<int> difference(kRanks);
+  std::vector<int> difference(kDistributionRules.ranks.value());
   const auto gap = [&](auto sign) {
     std::fill(difference.begin(), difference.end(), 0);
     size_t n = 0;
@@ -77,7 +73,7 @@ double PosePermutationP(const std::vector<double>& a, const std::vector<double>&
   };
   const double observed = gap([] { return 1; });
   RandomStream random(seed, RandomDomain::kDiagnosis, number, 5);
-  std::vector<double> permuted(kPermutations);
+  std::vector<double> permuted(kResidualRules.permutations.value());
   for (double& value : permuted) {
     uint64_t bits = 0;
     int left = 0;

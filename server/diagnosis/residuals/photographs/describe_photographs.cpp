@@ -7,11 +7,10 @@
 #include "server/diagnosis/residuals/photographs/photograph_curves.h"
 #include "server/diagnosis/residuals/photographs/photograph_silhouette.h"
 #include "server/diagnosis/residuals/photographs/photograph_slices.h"
+#include "server/diagnosis/residuals/photographs/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr size_t kWorstMaps = 3;  // and one picture of middling error
 
 struct DescribedPicture {
   images::PhotographError error;
@@ -94,11 +93,11 @@ std::vector<int> PicturesToShow(const std::vector<DescribedPicture>& pictures) {
       const bool known = std::any_of(shown.begin(), shown.end(), [&](int s) {
         return s == k || (other_object && pictures[s].error.object == pictures[k].error.object);
       });
-      if (shown.size() < kWorstMaps && !known) shown.push_back(k);
+      if (shown.size() < kPhotographResidualRules.worst_maps && !known) shown.push_back(k);
     }
   std::stable_sort(shown.begin(), shown.end(),
                    [&](int a, int b) { return pictures[a].error.rmse_grey > pictures[b].error.rmse_grey; });
-  if (order.size() > kWorstMaps) {
+  if (order.size() > kPhotographResidualRules.worst_maps) {
     const int middle = order[order.size() / 2];
     if (std::find(shown.begin(), shown.end(), middle) == shown.end()) shown.push_back(middle);
   }

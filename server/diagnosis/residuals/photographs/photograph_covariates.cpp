@@ -6,12 +6,12 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/photographs/photograph_silhouette.h"
+#include "server/diagnosis/residuals/photographs/rules.h"
 #include "server/image/scene/shading.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr float kOutlinePx = 2.5f;  // from the outline's pixels
 enum Part { kOutline, kObject, kGround };
 
 // Part of the picture and side of the light, a byte each.
@@ -33,7 +33,11 @@ PartsOfPicture PartsOf(const image::Photo& photo) {
   PartsOfPicture parts;
   parts.part.resize(object.size()), parts.side.resize(object.size());
   for (size_t at = 0; at < object.size(); ++at) {
-    parts.part[at] = from_outline[at] <= kOutlinePx * kOutlinePx ? kOutline : object[at] ? kObject : kGround;
+    parts.part[at] =
+        from_outline[at] <= kPhotographResidualRules.outline_px * kPhotographResidualRules.outline_px
+            ? kOutline
+        : object[at] ? kObject
+                     : kGround;
     const double x = static_cast<double>(at % width) - x_sum / std::max(1.0, count),
                  y = static_cast<double>(at / width) - y_sum / std::max(1.0, count);
     parts.side[at] = !object[at] ? 2 : x * right + y * down > 0 ? 0 : 1;

@@ -7,14 +7,11 @@
 #include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/distribution/permutation.h"
 #include "server/diagnosis/residuals/photographs/photograph_covariates.h"
+#include "server/diagnosis/residuals/photographs/rules.h"
+#include "server/diagnosis/residuals/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kCurveBins = 12;
-constexpr int kSignPermutations = 499;
-constexpr int kSampledPixels = 4000;  // of each picture, to place the bins
-constexpr int kMinIndependent = 6;    // poses, below which nothing is tested
 
 // Sums of one picture in each bin.
 struct PictureBins {
@@ -25,7 +22,8 @@ struct PictureBins {
 std::vector<double> EndsOfBins(const images::Photographs& photographs, const ResidualCovariate& covariate) {
   std::vector<double> values;
   const int pixels = photographs.width() * photographs.height();
-  const int each = std::max(1, std::min(kSampledPixels, 400000 / std::max(1, photographs.size())));
+  const int each = std::max(
+      1, std::min(kPhotographResidualRules.sampled_pixels.value(), 400000 / std::max(1, photographs.size())));
   for (int k = 0; k < photographs.size(); ++k)
     for (int j = 0; j < each; ++j) {
       const double value = covariate.value(k, static_cast<int>(static_cast<int64_t>(j) * pixels / each));
@@ -33,8 +31,8 @@ std::vector<double> EndsOfBins(const images::Photographs& photographs, const Res
     }
   std::sort(values.begin(), values.end());
   std::vector<double> ends;
-  for (int b = 1; b <= kCurveBins && !values.empty(); ++b) {
-    const double end = values[std::min(values.size() - 1, values.size() * b / kCurveBins)];
+  for (int b = 1; b <= kResidualRules.curve_bins && !values.empty(); ++b) {
+    const double end = values[std::min(values.size() - 1, values.size() * b / kResidualRules.curve_bins)];
     if (ends.empty() || end > ends.back()) ends.push_back(end);
   }
   if (!ends.empty()) ends.back() = INFINITY;  // what the sample missed
@@ -57,7 +55,7 @@ struct PoseBins {
 
 // Of any dependence on what varies within pictures: the pattern of each pose might as well have the other sign.
 double SignP(const PoseBins& poses, uint64_t seed, uint64_t number) {
-  if (poses.sums.size() < kMinIndependent) return 1;
+  if (poses.sums.size() < kPhotographResidualRules.min_independent) return 1;
   std::vector<double> all(poses.counts.size(), 0);
   const auto total = [&](RandomStream* random) {
     std::fill(all.begin(), all.end(), 0);
@@ -70,7 +68,7 @@ double SignP(const PoseBins& poses, uint64_t seed, uint64_t number) {
   const double observed = total(nullptr);
   std::vector<double> permuted;
   RandomStream random(seed, RandomDomain::kDiagnosis, 70000 + number);
-  for (int p = 0; p < kSignPermutations; ++p) permuted.push_back(total(&random));
+  for (int p = 0; p < kResidualRules.permutations; ++p) permuted.push_back(total(&random));
   return PermutationP(observed, permuted);
 }
 
@@ -97,13 +95,13 @@ double OrderP(const std::vector<double>& mean, const std::vector<int>& bin, cons
     for (size_t k = 0; k < values.size(); ++k) sums[bin[k]] += values[k];
     return Explained(sums, counts);
   };
-  if (mean.size() < kMinIndependent) return 1;
+  if (mean.size() < kPhotographResidualRules.min_independent) return 1;
   const double observed = statistic(centred);
   std::vector<double> permuted;
   RandomStream random(seed, RandomDomain::kDiagnosis, 80000 + number);
   std::vector<std::vector<int>> members(within ? poses : 1);
   for (size_t k = 0; k < mean.size(); ++k) members[group[k]].push_back(static_cast<int>(k));
-  for (int p = 0; p < kSignPermutations; ++p) {
+  for (int p = 0; p < kResidualRules.permutations; ++p) {
     std::vector<double> shuffled = centred;
     for (const std::vector<int>& all : members)
       for (size_t k = all.size(); k > 1; --k) std::swap(shuffled[all[k - 1]], shuffled[all[random.Below(k)]]);

@@ -4,15 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "server/diagnosis/residuals/photographs/rules.h"
+
 namespace touchstone::diagnosis::residuals {
 namespace {
 
 constexpr float kFar = 1e12f;
-constexpr double kClearOfObjectPx = 5;   // from where on a pixel is background, whatever is a little off
-constexpr double kMinBackground = 0.02;  // share of the picture
-constexpr double kScatters = 5;          // standard deviations of the background that stand out
-constexpr double kMinStandOut = 6;       // grey levels
-constexpr double kMinPiece = 0.02;       // of the expected object's pixels: less is dirt
 constexpr double kSigmaOfMad = 1.4826;
 
 // Lower envelope of parabolas along one line.
@@ -111,15 +108,20 @@ Silhouette CompareSilhouettes(const std::vector<float>& measured, const std::vec
   const std::vector<float> from_object = SquaredDistances(object, width, height);
   std::vector<float> background;
   for (size_t at = 0; at < mask.size(); ++at)
-    if (from_object[at] >= kClearOfObjectPx * kClearOfObjectPx) background.push_back(measured[at]);
-  if (background.size() < kMinBackground * mask.size()) return unknown;
+    if (from_object[at] >=
+        kPhotographResidualRules.clear_of_object_px * kPhotographResidualRules.clear_of_object_px)
+      background.push_back(measured[at]);
+  if (background.size() < kPhotographResidualRules.min_background * mask.size()) return unknown;
   const double level = Median(background);
   for (float& grey : background) grey = static_cast<float>(std::abs(grey - level));
-  const double stand_out = std::max(kMinStandOut, kScatters * kSigmaOfMad * Median(background));
+  const double stand_out =
+      std::max(kPhotographResidualRules.min_stand_out.value(),
+               kPhotographResidualRules.stand_out_sigmas * kSigmaOfMad * Median(background));
 
   std::vector<char> seen(mask.size());
   for (size_t at = 0; at < mask.size(); ++at) seen[at] = std::abs(measured[at] - level) > stand_out;
-  DropSmallPieces(width, height, std::max(2, static_cast<int>(kMinPiece * object_pixels)), &seen);
+  DropSmallPieces(width, height,
+                  std::max(2, static_cast<int>(kPhotographResidualRules.min_piece * object_pixels)), &seen);
   // Where the object is as bright as the background it is taken as expected, and not counted.
   std::vector<char> counts(mask.size());
   for (size_t at = 0; at < mask.size(); ++at) {

@@ -10,20 +10,12 @@
 
 #include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/photographs/photograph_covariates.h"
+#include "server/diagnosis/residuals/photographs/rules.h"
+#include "server/diagnosis/residuals/rules.h"
 #include "server/diagnosis/residuals/slices/slice_search.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr size_t kMaxPhotographSlices = 5;
-constexpr int kMaxCells = 80000, kMinCellsOfPicture = 60;
-constexpr int kTriesOfSlice = 8;
-constexpr double kMinShareOfExcess = 0.03;
-// On the half that the search did not see, poses as the independent units; the misfit of the set itself is certain.
-constexpr double kMinZOfPoses = 1.8;
-constexpr double kCertainShare = 0.03;  // of the excess to the noise, below which nothing is looked for
-constexpr int kMinPosesOfHalf = 3;
-constexpr double kOneSided = 0.2;  // share of a slice's excess in its mean, to call it brighter or darker
 
 struct PixelHalf {
   std::vector<int> live;
@@ -41,17 +33,18 @@ class PhotographSliceFinder {
     Collect();
     const double noise =
         sigma_grey_ * sigma_grey_ * photographs_.width() * photographs_.height() * photographs_.size();
-    if (!(search_.excess > 0) || !(total_excess_ > kCertainShare * noise)) return {};
+    if (!(search_.excess > 0) || !(total_excess_ > kPhotographResidualRules.certain_share * noise)) return {};
     const int min_cells = std::max(20, static_cast<int>(0.005 * cells_.size()));
     std::vector<images::PhotographSlice> slices;
-    while (slices.size() < kMaxPhotographSlices) {
+    while (slices.size() < kPhotographResidualRules.max_slices) {
       const std::vector<SliceCandidate> candidates =
-          SearchSlices(bins_, cells_, search_.live, min_cells, kTriesOfSlice);
+          SearchSlices(bins_, cells_, search_.live, min_cells, kResidualRules.slice_tries);
       const auto good =
           std::find_if(candidates.begin(), candidates.end(), [&](const SliceCandidate& candidate) {
-            return candidate.score < kMinShareOfExcess * search_.excess || AgreesOnOtherHalf(candidate);
+            return candidate.score < kResidualRules.min_slice_share * search_.excess ||
+                   AgreesOnOtherHalf(candidate);
           });
-      if (good == candidates.end() || good->score < kMinShareOfExcess * search_.excess) break;
+      if (good == candidates.end() || good->score < kResidualRules.min_slice_share * search_.excess) break;
       std::vector<int> live = search_.live;
       live.insert(live.end(), check_.live.begin(), check_.live.end());
       const SliceCandidate chosen = Simplified(bins_, cells_, live, *good);
@@ -70,7 +63,8 @@ class PhotographSliceFinder {
  private:
   void Collect() {
     const int pixels = photographs_.width() * photographs_.height();
-    const int each = std::clamp(kMaxCells / std::max(1, photographs_.size()), kMinCellsOfPicture, pixels);
+    const int each = std::clamp(kPhotographResidualRules.max_pixels / std::max(1, photographs_.size()),
+                                kPhotographResidualRules.min_pixels_of_picture.value(), pixels);
     std::vector<int> picture, place;
     for (int k = 0; k < photographs_.size(); ++k) {
       const std::vector<float> residual = PixelResiduals(photographs_, expected_, k);
@@ -116,10 +110,10 @@ class PhotographSliceFinder {
     std::map<int, double> lifts;
     for (const int cell : check_.live)
       if (HoldsCell(slice, cell)) lifts[pose_[cell]] += cells_.excess_s2[cell] - per_cell;
-    if (lifts.size() < kMinPosesOfHalf) return false;
+    if (lifts.size() < kPhotographResidualRules.min_slice_poses) return false;
     double sum = 0, squares = 0;
     for (const auto& [pose, lift] : lifts) sum += lift, squares += lift * lift;
-    return squares > 0 && sum > kMinZOfPoses * std::sqrt(squares);
+    return squares > 0 && sum > kResidualRules.certain_slice_z * std::sqrt(squares);
   }
 
   images::PhotographSlice Told(const SliceCandidate& slice) const {
@@ -147,7 +141,7 @@ class PhotographSliceFinder {
     told.mean_residual_grey = sum / count;
     told.rmse_grey = std::sqrt(squares / count);
     told.share_of_excess_error = std::clamp(excess / total_excess_, 0.0, 1.0);
-    if (count * told.mean_residual_grey * told.mean_residual_grey >= kOneSided * excess)
+    if (count * told.mean_residual_grey * told.mean_residual_grey >= kResidualRules.one_sided_share * excess)
       told.words = absl::StrFormat("%s than expected by %.3g grey levels",
                                    told.mean_residual_grey > 0 ? "brighter" : "darker",
                                    std::abs(told.mean_residual_grey));

@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "server/diagnosis/residuals/distribution/dependence.h"
+#include "server/diagnosis/residuals/rules.h"
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/slices/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr int kBins = 12;
-constexpr int kMaxTouches = 60000;
 constexpr int kTestsPerCurve = 1000;  // numbers of random streams: apart by more than there are curves
 
 // Upper ends of bins that hold equally many cells; categories have a bin each.
@@ -21,8 +21,8 @@ std::vector<double> BinEnds(const ResidualCovariate& covariate, std::vector<doub
     return ends;
   }
   std::sort(values.begin(), values.end());
-  for (int b = 1; b <= kBins && !values.empty(); ++b) {
-    const double end = values[std::min(values.size() - 1, values.size() * b / kBins)];
+  for (int b = 1; b <= kResidualRules.curve_bins && !values.empty(); ++b) {
+    const double end = values[std::min(values.size() - 1, values.size() * b / kResidualRules.curve_bins)];
     if (ends.empty() || end > ends.back()) ends.push_back(end);
   }
   return ends;
@@ -129,7 +129,7 @@ std::vector<ResidualCurve> MakeResidualCurves(const touches::Observations& obser
                                               const std::vector<double>& after, uint64_t seed) {
   const int fingers = observations.fingers;
   // Touches of one pose side by side, and so the cells that are made from them.
-  std::vector<int> touches = ThinnedTouches(observations, before, kMaxTouches);
+  std::vector<int> touches = ThinnedTouches(observations, before, kSliceRules.max_curve_touches);
   std::stable_sort(touches.begin(), touches.end(),
                    [&](int a, int b) { return observations.pose[a] < observations.pose[b]; });
   const std::vector<ResidualCovariate> covariates = CurveCovariates(observations, initial);

@@ -5,12 +5,10 @@
 
 #include "server/base/numbers/random.h"
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/slices/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kDraws = 1000;
-constexpr size_t kDeciding = 10;
 
 // Sums of squares of the readings of one pose.
 struct PoseSums {
@@ -59,17 +57,17 @@ std::vector<PoseSums> SumsOfPoses(const touches::Observations& o, const std::vec
 
 void Bootstrap(const std::vector<PoseSums>& poses, uint64_t seed, ModelDifference* result) {
   std::vector<double> differences;
-  for (int draw = 0; draw < kDraws; ++draw) {
+  for (int draw = 0; draw < kSliceRules.bootstrap_draws; ++draw) {
     RandomStream random(seed, RandomDomain::kDiagnosis, static_cast<uint64_t>(draw), 5);
     PoseSums sum;
     for (size_t n = 0; n < poses.size(); ++n) sum += poses[random.Below(poses.size())];
     differences.push_back(sum.Difference());
     result->other_better += differences.back() < 0;
   }
-  result->other_better /= kDraws;
+  result->other_better /= kSliceRules.bootstrap_draws;
   std::sort(differences.begin(), differences.end());
-  result->lower_s = differences[kDraws * 25 / 1000];
-  result->upper_s = differences[kDraws * 975 / 1000 - 1];
+  result->lower_s = differences[kSliceRules.bootstrap_draws * 25 / 1000];
+  result->upper_s = differences[kSliceRules.bootstrap_draws * 975 / 1000 - 1];
 }
 
 }  // namespace
@@ -116,13 +114,14 @@ ModelDifference CompareModels(const touches::Observations& o, const touches::Pre
   Bootstrap(poses, seed, &result);
   result.better = FindSlicesBeyond(o, first, before, after, sigma_s);
   result.worse = FindSlicesBeyond(o, other, after, before, sigma_s);
-  result.deciding = FindDecidingTouches(o, before, after, sigma_s, kDeciding, false);
-  const std::vector<DecidingTouch> rises = FindDecidingTouches(o, before, after, sigma_s, kDeciding, true);
+  result.deciding = FindDecidingTouches(o, before, after, sigma_s, kSliceRules.max_deciding, false);
+  const std::vector<DecidingTouch> rises =
+      FindDecidingTouches(o, before, after, sigma_s, kSliceRules.max_deciding, true);
   result.deciding.insert(result.deciding.end(), rises.begin(), rises.end());
   std::stable_sort(
       result.deciding.begin(), result.deciding.end(),
       [](const DecidingTouch& a, const DecidingTouch& b) { return std::abs(a.fall) > std::abs(b.fall); });
-  if (result.deciding.size() > kDeciding) result.deciding.resize(kDeciding);
+  if (result.deciding.size() > kSliceRules.max_deciding) result.deciding.resize(kSliceRules.max_deciding);
   return result;
 }
 

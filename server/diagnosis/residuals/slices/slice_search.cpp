@@ -7,12 +7,10 @@
 #include <cmath>
 
 #include "server/base/text/text.h"
+#include "server/diagnosis/residuals/slices/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kThresholds = 14;  // about so many per continuous covariate
-constexpr int kFewLevels = 8;    // up to so many distinct numbers are levels ("speed = 20 mm/s"), not a scale
 
 // The smallest of 1, 2 or 5 times a power of ten that is at least `step`.
 double ReadableStep(double step) {
@@ -37,11 +35,6 @@ std::vector<std::pair<int, int>> Ranges(const SliceBins& bins) {
   }
   return ranges;
 }
-
-// A second condition multiplies the score by this, so that it must gain more than it costs to read.
-constexpr double kWorthOfSecondCondition = 0.85;
-// A simpler slice replaces one that scores at most 1 / 0.75 of it.
-constexpr double kScoreThatOneConditionKeeps = 0.75;
 
 }  // namespace
 
@@ -73,10 +66,10 @@ SliceBins::SliceBins(const ResidualCovariate* covariate, std::vector<double> val
   std::sort(values.begin(), values.end());
 
   // Few distinct numbers are levels.
-  for (size_t k = 0; k < values.size() && levels_.size() <= kFewLevels; ++k)
+  for (size_t k = 0; k < values.size() && levels_.size() <= kSliceRules.few_levels; ++k)
     if (levels_.empty() || values[k] > levels_.back() + 1e-6 * (values.back() - values.front()))
       levels_.push_back(values[k]);
-  if (levels_.size() <= kFewLevels) {
+  if (levels_.size() <= kSliceRules.few_levels) {
     category_ = true;
     count_ = static_cast<int>(levels_.size());
     return;
@@ -86,7 +79,7 @@ SliceBins::SliceBins(const ResidualCovariate* covariate, std::vector<double> val
   // Else multiples of a readable step over the middle of the range.
   const double low = values[values.size() / 40], high = values[values.size() - 1 - values.size() / 40];
   if (high <= low) return;
-  const double step = ReadableStep((high - low) / kThresholds);
+  const double step = ReadableStep((high - low) / kSliceRules.thresholds);
   for (double t = std::ceil(low / step) * step; t < high && thresholds_.size() < kMax - 1; t += step)
     thresholds_.push_back(std::round(t / step) * step);
   count_ = static_cast<int>(thresholds_.size()) + 1;
@@ -177,7 +170,8 @@ SliceCandidate LiveCells::BestOfOne(const std::vector<SliceBins>& bins, int c) c
   for (const auto& [low, high] : Ranges(bins[c])) consider(low, high, 1);
   if (!bins[c].category())
     for (int low = 1; low < bins[c].count() - 1; ++low)
-      for (int high = low; high < bins[c].count() - 1; ++high) consider(low, high, kWorthOfSecondCondition);
+      for (int high = low; high < bins[c].count() - 1; ++high)
+        consider(low, high, kSliceRules.second_condition);
   return best;
 }
 
@@ -210,7 +204,7 @@ SliceCandidate LiveCells::BestOfTwo(const std::vector<SliceBins>& bins, int a, i
     const Sums* const after = &below[(high_a + 1) * width];
     const Sums* const before = &below[low_a * width];
     for (const auto& [low_b, high_b] : ranges_b) {
-      const double value = kWorthOfSecondCondition *
+      const double value = kSliceRules.second_condition *
                            Score((after[high_b + 1] - after[low_b]) - (before[high_b + 1] - before[low_b]));
       if (value > best.score)
         best = {{{a, static_cast<uint8_t>(low_a), static_cast<uint8_t>(high_a)},
@@ -268,7 +262,7 @@ SliceCandidate Simplified(const std::vector<SliceBins>& bins, const SliceCells& 
   };
   const double whole = score(slice);
   const SliceCandidate* best = &slice;
-  double best_score = kScoreThatOneConditionKeeps * whole;
+  double best_score = kSliceRules.one_condition_keeps * whole;
   for (SliceCandidate& candidate : simpler) {
     candidate.score = score(candidate);
     if (candidate.score >= best_score) best = &candidate, best_score = candidate.score;

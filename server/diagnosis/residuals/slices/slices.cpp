@@ -9,23 +9,12 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/text/readable_time.h"
+#include "server/diagnosis/residuals/rules.h"
+#include "server/diagnosis/residuals/slices/rules.h"
 #include "server/diagnosis/residuals/slices/slice_search.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kMaxSlices = 6;
-constexpr int kMaxTouchesSearched = 30000;
-constexpr int kTries = 8;           // candidates per slice that are checked on the other half
-constexpr double kMinShare = 0.03;  // of the excess error, for a slice to be worth reporting
-
-// A slice is accepted if the other half shows it with a z score of at least kMinZ. Where the excess error of
-// the whole set is kCertainMisfit standard deviations above noise, a misfit is certain and the smaller score
-// is enough: a slice of a few poses cannot reach four.
-constexpr double kMinZ = 4, kMinZIfMisfitIsCertain = 1.8, kCertainMisfit = 10;
-
-constexpr int kMinPoses = 5;            // in each half
-constexpr double kCoherentShare = 0.2;  // of a slice's excess error in its mean, to call it early or late
 
 // One half of the poses. A cell is one observed finger of one touch.
 struct Half {
@@ -133,7 +122,7 @@ SliceEvidence SliceFinder::EvidenceOf(const SliceCandidate& slice, const std::ve
     mean += cells_.residual_s[cell] - residual_per_cell;
   }
   SliceEvidence evidence;
-  if (sums.size() < kMinPoses) return evidence;
+  if (sums.size() < kSliceRules.min_poses) return evidence;
   double lift = 0, lift2 = 0, mean = 0, mean2 = 0;
   for (const auto& [pose, sum] : sums) {
     lift += sum.first, lift2 += sum.first * sum.first;
@@ -188,7 +177,7 @@ ErrorSlice SliceFinder::Describe(const SliceCandidate& slice, double all_excess_
   described.mean_residual_s = mean_s;
   described.rmse_s = std::sqrt(squares / cells);
   described.share_of_excess_error = std::clamp(excess / all_excess_s2, 0.0, 1.0);
-  if (cells * mean_s * mean_s >= kCoherentShare * excess)
+  if (cells * mean_s * mean_s >= kResidualRules.one_sided_share * excess)
     described.words =
         absl::StrCat("contact too ", mean_s < 0 ? "early" : "late", " by ", TimeInWords(std::abs(mean_s)));
   else
@@ -201,8 +190,9 @@ double SliceFinder::MinZ(double total_excess_s2) const {
   double squares = 0;  // variance of the excess that noise alone would have, over 2 sigma^4
   for (int k = 0; k < observations_.size(); ++k)
     if (observations_.used[k]) squares += std::max(0, FingersCompared(observations_, residuals_, k) - 1);
-  const bool certain = total_excess_s2 > kCertainMisfit * sigma_s_ * sigma_s_ * std::sqrt(2 * squares);
-  return certain ? kMinZIfMisfitIsCertain : kMinZ;
+  const bool certain =
+      total_excess_s2 > kSliceRules.certain_misfit * sigma_s_ * sigma_s_ * std::sqrt(2 * squares);
+  return certain ? kResidualRules.certain_slice_z.value() : kSliceRules.min_z.value();
 }
 
 bool SliceFinder::Confirmed(const SliceCandidate& slice, double min_z) const {
@@ -212,7 +202,7 @@ bool SliceFinder::Confirmed(const SliceCandidate& slice, double min_z) const {
 }
 
 std::vector<ErrorSlice> SliceFinder::Find() {
-  const std::vector<int> touches = ThinnedTouches(observations_, residuals_, kMaxTouchesSearched);
+  const std::vector<int> touches = ThinnedTouches(observations_, residuals_, kSliceRules.max_touches);
   Collect(touches);
   const double total = TotalExcess();
   if (!(total > 0) || !(search_.excess_s2 > 0)) return {};
@@ -224,14 +214,17 @@ std::vector<ErrorSlice> SliceFinder::Find() {
   const int min_cells = static_cast<int>(std::ceil(0.5 * min_touches));
 
   std::vector<ErrorSlice> slices;
-  while (static_cast<int>(slices.size()) < kMaxSlices) {
-    const auto candidates = SearchSlices(bins_, cells_, search_.live, min_cells, kTries);
+  while (static_cast<int>(slices.size()) < kSliceRules.max_slices) {
+    const auto candidates = SearchSlices(bins_, cells_, search_.live, min_cells, kResidualRules.slice_tries);
     const auto confirmed =
         std::find_if(candidates.begin(), candidates.end(), [&](const SliceCandidate& candidate) {
-          return candidate.score < kMinShare * search_.excess_s2 || Confirmed(candidate, min_z);
+          return candidate.score < kResidualRules.min_slice_share * search_.excess_s2 ||
+                 Confirmed(candidate, min_z);
         });
     // Candidates come best first: once one is too small, so are the rest.
-    if (confirmed == candidates.end() || confirmed->score < kMinShare * search_.excess_s2) break;
+    if (confirmed == candidates.end() ||
+        confirmed->score < kResidualRules.min_slice_share * search_.excess_s2)
+      break;
     std::vector<int> live = search_.live;
     live.insert(live.end(), check_.live.begin(), check_.live.end());
     const SliceCandidate chosen = Simplified(bins_, cells_, live, *confirmed);

@@ -7,13 +7,11 @@
 #include <vector>
 
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/touches/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
 
-constexpr double kMinRelativeDifference = 1.0 / 6;
-constexpr double kMaxChance = 1e-3;
-constexpr int kMinPosesCompared = 20;       // below it a mean of squares is no normal variable
 constexpr size_t kBlocks[] = {80, 40, 20};  // of neighbours in time
 
 // Sums over the touches in which all fingers reported.
@@ -69,11 +67,14 @@ std::optional<FingerScatter> FindFingerScatter(const touches::Observations& o,
   double largest = 0;
   for (int i = 0; i < o.fingers; ++i) {
     const ScatterSums sums = SumSquares(o, residuals, i);
-    if (static_cast<int>(sums.apart.size()) < kMinPosesCompared || !(sums.others > 0)) continue;
+    if (static_cast<int>(sums.apart.size()) < kTouchResidualRules.min_finger_poses || !(sums.others > 0))
+      continue;
     const double ratio = std::sqrt(sums.own / sums.others);
     const double z = std::abs(sums.own - sums.others) / std::sqrt(sums.Variance());
     const double p = std::min(1.0, o.fingers * std::erfc(z / std::sqrt(2.0)));
-    if (p > kMaxChance || std::abs(std::log(ratio)) < std::log1p(kMinRelativeDifference)) continue;
+    if (p > kTouchResidualRules.max_finger_p ||
+        std::abs(std::log(ratio)) < std::log1p(kTouchResidualRules.min_finger_difference.value()))
+      continue;
     if (std::abs(std::log(ratio)) <= largest) continue;
     largest = std::abs(std::log(ratio));
     found = {i, std::sqrt(sums.own / sums.touches), std::sqrt(sums.others / sums.touches), p};

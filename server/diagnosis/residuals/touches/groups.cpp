@@ -8,12 +8,10 @@
 
 #include "server/base/units.h"
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/touches/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kTimeBins = 8;
-constexpr size_t kMaxGroups = 200;  // of one kind
 
 struct GroupSums {
   std::string name;
@@ -97,7 +95,7 @@ void ErrorGrouper::Add(size_t n, int only_finger, GroupSums* group) const {
 }
 
 void ErrorGrouper::Report(ErrorGroupKind kind, const std::vector<GroupSums>& groups) {
-  if (groups.size() > kMaxGroups) return;
+  if (groups.size() > kTouchResidualRules.max_groups) return;
   for (const GroupSums& group : groups) {
     if (group.touches == 0 || group.dof == 0) continue;
     ErrorGroup reported;
@@ -142,15 +140,15 @@ void ErrorGrouper::ByTime() {
   if (!observations_.set->has_session_time || touches_.empty()) return;
   const std::vector<double> time_s = Column([&](int row) { return observations_.set->session_time_s[row]; });
   const auto [begin, end] = std::minmax_element(time_s.begin(), time_s.end());
-  const double part_s = (*end - *begin) / kTimeBins;
+  const double part_s = (*end - *begin) / kTouchResidualRules.time_bins;
   if (!(part_s > 0)) return;
-  std::vector<GroupSums> parts(kTimeBins);
-  for (int p = 0; p < kTimeBins; ++p)
+  std::vector<GroupSums> parts(kTouchResidualRules.time_bins.value());
+  for (int p = 0; p < kTouchResidualRules.time_bins; ++p)
     parts[p].name = absl::StrCat(std::lround((*begin + p * part_s) / 60), " to ",
                                  std::lround((*begin + (p + 1) * part_s) / 60), " min");
   std::vector<int> part(touches_.size());
   for (size_t n = 0; n < touches_.size(); ++n)
-    part[n] = std::min(kTimeBins - 1, static_cast<int>((time_s[n] - *begin) / part_s));
+    part[n] = std::min(kTouchResidualRules.time_bins - 1, static_cast<int>((time_s[n] - *begin) / part_s));
   ByLevel(ErrorGroupKind::kTime, std::move(parts), part);
 }
 

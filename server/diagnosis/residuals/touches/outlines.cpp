@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <set>
 
+#include "server/diagnosis/residuals/touches/rules.h"
+
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kOutlineTriangles = 400;
 
 // One vertex for each occupied cell of a grid with `cells` cells along the longest side of the box.
 geometry::TriangleMesh Clustered(const geometry::TriangleMesh& mesh, const geometry::Bounds& bounds,
@@ -68,8 +68,8 @@ std::vector<DrawableObject> MakeOutlines(const touches::Observations& observatio
   std::vector<DrawableObject> outlines;
   for (size_t o = 0; o < observations.objects.size(); ++o)
     if (observations.surfaces[o])
-      outlines.push_back(
-          {observations.objects[o], Decimated(observations.surfaces[o]->mesh(), kOutlineTriangles)});
+      outlines.push_back({observations.objects[o], Decimated(observations.surfaces[o]->mesh(),
+                                                             kTouchResidualRules.outline_triangles)});
   return outlines;
 }
 

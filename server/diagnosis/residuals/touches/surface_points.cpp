@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/residuals/touches/rules.h"
+
 namespace touchstone::diagnosis::residuals {
 namespace {
-
-constexpr int kMaxSurfacePoints = 4000;
-constexpr int kMaxPointsPerObject = 1500;
 
 // One pose and finger: repeats touch the same spot.
 struct Spot {
@@ -47,7 +46,8 @@ std::vector<SurfaceResidual> MakeSurfaceResiduals(const touches::Observations& o
   for (size_t s = 0; s < spots.size(); ++s)
     if (spots[s].touch >= 0) of_object[observations.object[spots[s].touch]].push_back(s);
   const size_t max_points =
-      std::max(1, std::min(kMaxPointsPerObject, kMaxSurfacePoints / std::max(1, objects)));
+      std::max(1, std::min(kTouchResidualRules.max_object_points.value(),
+                           kTouchResidualRules.max_surface_points / std::max(1, objects)));
   for (int o = 0; o < objects; ++o) {
     const size_t count = std::min(max_points, of_object[o].size());
     for (size_t n = 0; n < count; ++n) {

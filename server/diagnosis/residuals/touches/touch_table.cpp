@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/touches/rules.h"
 
 namespace touchstone::diagnosis::residuals {
 namespace {
@@ -37,7 +38,8 @@ TouchTable MakeTouchTable(const touches::Observations& observations, const touch
   if (initial.contact_m.empty()) return table;
   const int fingers = observations.fingers;
   const session::MeasurementSet& set = *observations.set;
-  const std::vector<int> touches = ThinnedTouches(observations, before, kMaxTableTouches);
+  const std::vector<int> touches =
+      ThinnedTouches(observations, before, kTouchResidualRules.max_table_touches);
   table.spacing_m = spacing_m;
   for (int k = 0; k < observations.size(); ++k)
     table.touches_in_all += observations.used[k] && FingersCompared(observations, before, k) > 1;

@@ -34,10 +34,8 @@ struct TouchTable {
   int size() const { return static_cast<int>(touch.size()); }
 };
 
-inline constexpr int kMaxTableTouches = 4000;
-
-// At most about kMaxTableTouches, whole poses. simulated_s: the initial model's time less the mean over the touch's
-// compared fingers. residual_s and after_s are `before` and `after`, [k * fingers + finger], seconds, NaN where a finger
+// At most about TouchResidualRules::max_table_touches, whole poses. simulated_s: the initial model's time less the mean over
+// the touch's compared fingers. residual_s and after_s are `before` and `after`, [k * fingers + finger], seconds, NaN where a finger
 // takes no part. Empty if the prediction has no contacts.
 TouchTable MakeTouchTable(const touches::Observations& observations, const touches::Prediction& initial,
                           const std::vector<double>& before, const std::vector<double>& after,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "server/diagnosis/residuals/touches/rules.h"
 #include "server/diagnosis/touches/synthetic_test_set.h"
 
 namespace touchstone::diagnosis::residuals {
@@ -66,8 +67,8 @@ TEST(TouchTable, IsASampleOfWholePosesOfALargeSet) {
   const TouchTable table =
       TableOf(WithContacts(touches::SyntheticSet(5, 500, 4, touches::kSyntheticSigmaS, 8)));
   EXPECT_EQ(table.touches_in_all, 10000);
-  EXPECT_GT(table.size(), kMaxTableTouches * 3 / 4);
-  EXPECT_LT(table.size(), kMaxTableTouches * 5 / 4);
+  EXPECT_GT(table.size(), kTouchResidualRules.max_table_touches * 3 / 4);
+  EXPECT_LT(table.size(), kTouchResidualRules.max_table_touches * 5 / 4);
 }
 
 }  // namespace

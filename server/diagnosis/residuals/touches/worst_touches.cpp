@@ -4,13 +4,9 @@
 #include <cmath>
 
 #include "server/diagnosis/residuals/slices/covariates.h"
+#include "server/diagnosis/residuals/touches/rules.h"
 
 namespace touchstone::diagnosis::residuals {
-namespace {
-
-constexpr size_t kMaxWorstTouches = 10;
-
-}  // namespace
 
 std::vector<WorstTouch> FindWorstTouches(const touches::Observations& observations,
                                          const std::vector<double>& residuals) {
@@ -25,7 +21,7 @@ std::vector<WorstTouch> FindWorstTouches(const touches::Observations& observatio
       if (!std::isnan(residual_s)) norm2[k] += residual_s * residual_s;
     }
   }
-  const size_t count = std::min(kMaxWorstTouches, touches.size());
+  const size_t count = std::min(kTouchResidualRules.max_worst.value(), touches.size());
   std::partial_sort(touches.begin(), touches.begin() + count, touches.end(),
                     [&](int a, int b) { return norm2[a] != norm2[b] ? norm2[a] > norm2[b] : a < b; });
   std::vector<WorstTouch> worst;
