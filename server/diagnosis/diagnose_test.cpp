@@ -9,6 +9,7 @@
 #include "server/base/test_tier.h"
 #include "server/diagnosis/checks/sampled_set.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/report/message/write_report.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
@@ -533,9 +534,10 @@ TEST(Diagnose, IsNeverCertain) {
   touches::HiddenRig rig;
   rig.hidden = {{"tip_radius", {"radius_mm=1.5"}}};
   const report::Diagnosis report = DiagnoseRig(rig);
-  for (const report::Step& step : report.steps) EXPECT_LE(step.probability, engine::kMaxProbability);
+  for (const report::Step& step : report.steps)
+    EXPECT_LE(step.probability, engine::kCompetitionRules.max_probability.value());
   for (const report::Candidate& candidate : report.data[0].candidates)
-    EXPECT_LE(candidate.probability, engine::kMaxProbability);
+    EXPECT_LE(candidate.probability, engine::kCompetitionRules.max_probability.value());
 }
 
 }  // namespace

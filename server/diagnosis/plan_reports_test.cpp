@@ -7,6 +7,7 @@
 
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
 namespace touchstone::diagnosis {
@@ -25,7 +26,8 @@ TEST(CheckTouchPlan, GivesNoVerdictAndNamesWhatIsMissed) {
   EXPECT_FALSE(check.detectable.empty());
   int missed = 0;
   for (const engine::DetectableValue& value : check.detectable)
-    missed += value.effect->name == "return_hysteresis" && value.power_at_typical < engine::kDetectionPower;
+    missed += value.effect->name == "return_hysteresis" &&
+              value.power_at_typical < engine::kCompetitionRules.detection_power;
   EXPECT_EQ(missed > 0, check.summary.find("return_hysteresis") != std::string::npos) << check.summary;
 }
 
@@ -65,7 +67,7 @@ TEST_P(PredictedPower, IsThatOfDiagnoses) {
   const int named = Named(rig, effect, value, kSets);
   RecordProperty("named", named);
   // 32 expected; 2.5 standard deviations.
-  EXPECT_NEAR(named, engine::kDetectionPower * kSets, 6.5) << effect << " " << value;
+  EXPECT_NEAR(named, engine::kCompetitionRules.detection_power * kSets, 6.5) << effect << " " << value;
 }
 
 INSTANTIATE_TEST_SUITE_P(

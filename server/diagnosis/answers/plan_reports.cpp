@@ -6,6 +6,7 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/selection/touch_modality.h"
 
 namespace touchstone::diagnosis {
@@ -25,7 +26,7 @@ Fates FatesOf(const std::vector<engine::DetectableValue>& values) {
     // The values of one effect follow each other.
     bool found = false, untold = true;
     for (end = first; end < values.size() && values[end].effect == values[first].effect; ++end) {
-      if (values[end].power_at_typical < engine::kDetectionPower) continue;
+      if (values[end].power_at_typical < engine::kCompetitionRules.detection_power) continue;
       found = true;
       untold &= !values[end].told_from.has_value();
     }

@@ -3,12 +3,10 @@
 #include "server/base/status.h"
 #include "server/diagnosis/engine/competition/candidate_ranking.h"
 #include "server/diagnosis/engine/ladder/step_order.h"
+#include "server/diagnosis/engine/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kUnexplainedP = 1e-4;      // of the lack of fit, for a rest without a name
-constexpr double kUnexplainedShare = 0.01;  // of the noise that such a rest must add
 
 // Of any kind of measurement.
 const std::vector<HypothesisRule>& RulesOfAnyKind() {
@@ -114,7 +112,8 @@ absl::StatusOr<Findings> FindMissing(const Modality& modality, double noise) {
 }
 
 bool StructureRemains(const Quality& quality, double noise) {
-  return quality.lack_of_fit_p < kUnexplainedP && quality.rmse > (1 + kUnexplainedShare) * noise;
+  return quality.lack_of_fit_p < kEngineRules.unexplained_p &&
+         quality.rmse > (1 + kEngineRules.unexplained_share) * noise;
 }
 
 }  // namespace touchstone::diagnosis::engine

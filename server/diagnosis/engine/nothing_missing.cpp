@@ -6,13 +6,13 @@
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/distributions.h"
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/engine/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
 
 // Kinds draw from one seed: a draw of one goes with a draw of another index of the next.
 constexpr int kDrawsApart = 37;
-constexpr double kMinDegrees = 2;  // clusters beyond the values that they would explain
 
 // A value per group.
 Eigen::MatrixXd OnEachGroup(const ObservationModel& rows, const Eigen::MatrixXd& columns) {
@@ -97,7 +97,7 @@ Eigen::MatrixXd LinearHypotheses::PValues(const Eigen::MatrixXd& residuals) cons
     const Parts parts = PartsOf(basis);
     const bool clustered = !clusters_.empty();
     const double degrees = clustered ? static_cast<double>(parts.size()) - rank : left;
-    if (clustered && degrees < kMinDegrees) continue;
+    if (clustered && degrees < kEngineRules.min_degrees_of_freedom) continue;
     for (int draw = 0; draw < residuals.cols(); ++draw) {
       const double variance = std::max((all[draw] - taken[draw]) / left, 1e-300);
       const double over = clustered ? Overdispersion(basis, parts, residuals.col(draw), variance) : 1;
@@ -148,7 +148,7 @@ Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics) {
 }
 
 TriedPValues AgreeingPValues(int hypotheses) {
-  return TriedPValues::Ones(hypotheses, 1 + kNoiseDraws);
+  return TriedPValues::Ones(hypotheses, 1 + kEngineRules.noise_draws);
 }
 
 TriedPValues ImpossiblePValues(int hypotheses) {

@@ -14,10 +14,9 @@
 #include "server/diagnosis/engine/competition/result.h"
 #include "server/diagnosis/engine/effect_columns.h"
 #include "server/diagnosis/engine/fit/observation_model.h"
+#include "server/diagnosis/engine/rules.h"
 
 namespace touchstone::diagnosis::engine {
-
-inline constexpr int kNoiseDraws = 199;
 
 // p values of what was tried on one kind of measurement: hypotheses x (1 + draws); column 0 has those of the data. Empty: this
 // kind cannot say.
@@ -63,12 +62,12 @@ class LinearHypotheses {
 
 // Columns: `residual`, then what noise alone leaves of these rows, of variance 1 in each direction that they have.
 Eigen::MatrixXd DataAndNoise(const ObservationModel& rows, const Eigen::VectorXd& residual, uint64_t seed,
-                             int draws = kNoiseDraws);
+                             int draws = kEngineRules.noise_draws);
 
 // Columns: `residual` of a model that nothing was fitted of, then the same with the signs of whole clusters turned at random, which
 // says nothing else where errors of clusters are independent and as often above as below. `clusters` as of LinearHypotheses.
 Eigen::MatrixXd DataAndTurned(const Eigen::VectorXd& residual, const std::vector<int>& clusters,
-                              uint64_t seed, int draws = kNoiseDraws);
+                              uint64_t seed, int draws = kEngineRules.noise_draws);
 
 // p values of statistics (hypotheses x draws, in any unit) of which draws 1, 2, ... show mean and spread: either tail.
 Eigen::MatrixXd PValuesOfStatistics(const Eigen::MatrixXd& statistics);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/images/photo_ladder.h"
 #include "server/diagnosis/images/rules.h"
 #include "server/effects/all_effects.h"
@@ -41,7 +42,7 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
   if (own == effects.end()) {
     if (sigma < kImageRules.min_sigma_grey && gain == 0) return;
     engine::LadderStep& step = engine::AddNoiseStep(effect, {sigma, gain}, std::move(parameters),
-                                                    engine::kMaxProbability, quality, improvement);
+                                                    engine::kCompetitionRules.max_probability, quality, improvement);
     step.model = improvement->improved;
     return;
   }

@@ -7,13 +7,11 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kMaxFitted = 8;       // candidates that are fitted in full
-constexpr int kMaxFittedOnOne = 3;  // ... of those that do not act on all objects alike
 
 class Ranking {
  public:
@@ -32,7 +30,8 @@ class Ranking {
       return absl::OkStatus();
     }
     // Of those that do not act on all objects alike only the likely ones: there are many.
-    if (extension.rare && (fitted_on_one_ == kMaxFittedOnOne || !extension.Acts())) return absl::OkStatus();
+    if (extension.rare && (fitted_on_one_ == kCompetitionRules.max_fitted_on_one || !extension.Acts()))
+      return absl::OkStatus();
     RankedCandidate& candidate = ranked_.emplace_back();
     candidate.effect = extension.name;
     candidate.scope = from.per_object ? EffectScope::kObject : EffectScope::kRig;
@@ -41,7 +40,7 @@ class Ranking {
       return absl::OkStatus();
     }
     candidate.gain_nats = gain_nats;
-    if (extension.rare || fitted_ < kMaxFitted) {
+    if (extension.rare || fitted_ < kCompetitionRules.max_fitted) {
       ++(extension.rare ? fitted_on_one_ : fitted_);
       TOUCHSTONE_RETURN_IF_ERROR(FitAlone(extension, &candidate));
     } else {

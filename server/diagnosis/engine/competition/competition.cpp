@@ -6,20 +6,11 @@
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kSameLikelihoodNats = 1;  // less is no difference
-constexpr double kBoundTolerance = 1e-6;   // of the typical size
-constexpr double kWorthSayingNats =
-    5;                          // what has no name and is not farther behind is named beside the effect
-constexpr size_t kMaxLeft = 4;  // models between which further measurements are to tell
-// Two causes that are known to act nearly alike, where derivatives are rough (ObservationModel), are told apart by a clear
-// share of what they explain only: an explanation that is slightly off, for its values or for its place in the search,
-// loses more than the likelihood knows.
-constexpr double kClearShare = 0.2;
 
 Eigen::MatrixXd ColumnsOf(const Fit& fit, int effect) {
   Eigen::MatrixXd columns(fit.columns.values.rows(), 0);
@@ -36,7 +27,7 @@ bool ActsAlike(const Fit& fit, int effect, const Fit& other_fit, int other) {
   const Eigen::MatrixXd own = ColumnsOf(fit, effect), span = ColumnsOf(other_fit, other);
   if (own.cols() == 0 || span.cols() == 0 || own.rows() != span.rows()) return false;
   const Eigen::MatrixXd outside = own - span * SolveLeastSquaresColumns(span, own);
-  return outside.norm() < kAlike * own.norm();
+  return outside.norm() < kCompetitionRules.alike * own.norm();
 }
 
 // Whether the data cannot tell a competitor from effect `index`.
@@ -55,7 +46,8 @@ class Equivalence {
     const Fit& fit = whole_.fit;
     const double evidence = found->relative_log_evidence;
     const bool declared = IsDeclaredConfounded(own_, other.name);
-    const bool as_likely = other.fit.log_likelihood > fit.log_likelihood - kSameLikelihoodNats;
+    const bool as_likely =
+        other.fit.log_likelihood > fit.log_likelihood - kCompetitionRules.same_likelihood_nats;
     const int added = static_cast<int>(other.fit.model.base().effects.size()) - 1;
     found->stopped = declared && added >= whole_.initial_effects && IsAtBound(other.fit, added) &&
                      !IsAtBound(fit, index_) && ActsAlike(fit, index_, other.fit, added);
@@ -63,7 +55,7 @@ class Equivalence {
                         (as_likely && (declared || other.fit.model.size() <= fit.model.size())) ||
                         found->stopped ||
                         (declared && search_.observations().HasRoughDerivatives(own_) &&
-                         evidence > -kClearShare * gain_nats_);
+                         evidence > -kCompetitionRules.clear_share * gain_nats_);
   }
 
  private:
@@ -101,7 +93,7 @@ absl::StatusOr<SelectedStep> AssessStep(const StepwiseSearch& search, const Expl
   }
   if (const auto rival = rivals.find(own); rival != rivals.end()) {
     all.push_back(rival->second.ahead_nats);
-    if (rival->second.ahead_nats > -kWorthSayingNats) step.words = rival->second.words;
+    if (rival->second.ahead_nats > -kCompetitionRules.worth_saying_nats) step.words = rival->second.words;
   }
   step.probability = ProbabilityAmong(same_or_equivalent, all);
   return step;
@@ -141,7 +133,7 @@ ExplanationsLeft FindExplanationsLeft(const Fit& fit, const std::vector<Selected
   for (const CompetingEffect& other : closest->competing) {
     left.confounded |= other.equivalent;
     if (!other.equivalent && left.models.size() > 1) break;
-    if (left.models.size() == kMaxLeft) break;
+    if (left.models.size() == kCompetitionRules.max_left) break;
     left.models.push_back({other.name, std::make_shared<const model::Model>(other.model)});
   }
   return left;
@@ -150,7 +142,7 @@ ExplanationsLeft FindExplanationsLeft(const Fit& fit, const std::vector<Selected
 bool IsAtBound(const Fit& fit, int index) {
   for (int i = 0; i < fit.model.size(); ++i) {
     const FreeParameter& p = fit.model.parameters()[i];
-    const double near = kBoundTolerance * p.scale;
+    const double near = kCompetitionRules.value_tolerance * p.scale;
     if (p.effect != index || std::abs(fit.point[i] - p.neutral) <= near) continue;
     if (fit.point[i] <= p.lower + near || fit.point[i] >= p.upper - near) return true;
   }
@@ -166,7 +158,7 @@ bool ChangesNothing(const Fit& fit, int index) {
 }
 
 double ProbabilityOfShare(double log_share) {
-  return std::min(kMaxProbability, std::exp(log_share));
+  return std::min(kCompetitionRules.max_probability.value(), std::exp(log_share));
 }
 
 void PutFirst(CovariateTest test, UnexplainedRest* rest) {

@@ -14,10 +14,6 @@
 
 namespace touchstone::diagnosis::engine {
 
-// An effect acts as another one does where it leaves out no larger share of the other's response. Only its bounds stop it then,
-// and they tell the two apart no more than a belief does.
-inline constexpr double kAlike = 0.03;
-
 // Another way to explain what one step explains.
 struct CompetingEffect {
   std::string name;
@@ -68,7 +64,7 @@ bool IsAtBound(const Fit& fit, int index);
 bool ChangesNothing(const Fit& fit, int index);
 
 // Of an explanation whose evidence has this share, as a logarithm, of the evidence of all: the one place that keeps
-// probabilities at or below kMaxProbability.
+// probabilities at or below CompetitionRules::max_probability.
 double ProbabilityOfShare(double log_share);
 // The same from a log of odds, nats.
 double ProbabilityOf(double log_odds);

@@ -12,19 +12,12 @@
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/competition/expected_evidence.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/search/size_grid.h"
 #include "server/model/parameter_values.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kMaxSteps = 8;            // towards a size
-constexpr double kNear = 0.02;          // of a size, where the steps end
-constexpr double kMaxGrowth = 30;       // of a size in one step
-constexpr size_t kRivalsCompared = 4;   // by evidence, the most alike first
-constexpr double kNoResponse = 1e-6;    // of the noise: rows that do not move
-constexpr double kNoGain = 0.05;        // nats of likelihood
-constexpr double kNoResemblance = 0.1;  // correlation of an effect that is no rival
 
 // One value of an effect, and what a size of it means.
 class SizedValue {
@@ -97,7 +90,8 @@ class Detector {
  private:
   // Whether the rows move at all.
   bool Moves(const ExpectedStep& step) const {
-    return step.response.norm() > kNoResponse * expected_.sigma() * std::sqrt(expected_.rows());
+    return step.response.norm() >
+           kCompetitionRules.no_response * expected_.sigma() * std::sqrt(expected_.rows());
   }
 
   // A size at which the rows move: *size, or the smallest on the grid. False: none.
@@ -123,15 +117,18 @@ class Detector {
       alike.emplace_back(std::sqrt(expected_.ShareExplainedBy(other, step)), other);
     }
     std::sort(alike.rbegin(), alike.rend());
-    if (alike.size() > kRivalsCompared) alike.resize(kRivalsCompared);
+    if (alike.size() > kCompetitionRules.max_rivals_compared)
+      alike.resize(kCompetitionRules.max_rivals_compared);
     const bool any = !question_.rival.empty();
     int nearest = -1;
     double best = -INFINITY;
     const double without = expected_.Without(step).log_likelihood;
     for (const auto& [r, other] : alike) {
-      if (r < kNoResemblance && !any) continue;
+      if (r < kCompetitionRules.no_resemblance && !any) continue;
       const LaplaceEvidence with = expected_.Linear(step, other);
-      if (with.log_evidence <= best || (!any && with.log_likelihood < without + kNoGain)) continue;
+      if (with.log_evidence <= best ||
+          (!any && with.log_likelihood < without + kCompetitionRules.no_gain_nats))
+        continue;
       best = with.log_evidence;
       nearest = other;
       *correlation = r;
@@ -178,7 +175,8 @@ class Detector {
     if (at_typical) value.power_at_typical = expected_.Power(m, step);
     const auto found_at = [&](const ExpectedStep& at) -> absl::StatusOr<double> {
       const int values = extension.start.size() - expected_.own();
-      return at.ratio / NoncentralityForTail(expected_.RatioNeeded(m, at), values, kDetectionPower);
+      return at.ratio /
+             NoncentralityForTail(expected_.RatioNeeded(m, at), values, kCompetitionRules.detection_power);
     };
     TOUCHSTONE_ASSIGN_OR_RETURN(const bool found, Grow(m, i, sized.reach(), found_at, &size, &step));
     if (found) {
@@ -205,7 +203,8 @@ class Detector {
     if (!value->found_from) return absl::OkStatus();
     // What acts as the effect does is stopped by its bounds alone, and they tell nothing; nor does its number of values where
     // it is known to hold the effect as a part.
-    const bool alike = 1 - value->correlation * value->correlation < kAlike * kAlike;
+    const bool alike =
+        1 - value->correlation * value->correlation < kCompetitionRules.alike * kCompetitionRules.alike;
     if (alike && (IsDeclaredConfounded(*value->effect, other.name) ||
                   other.start.size() <= extensions_[m].start.size()))
       return absl::OkStatus();
@@ -225,11 +224,12 @@ class Detector {
   template <typename Measure>
   absl::StatusOr<bool> Grow(int m, int i, double reach, const Measure& measure, double* size,
                             ExpectedStep* e) const {
+    const double growth = kCompetitionRules.max_growth;
     double below = 0, above = INFINITY;  // sizes that are too small, and large enough
-    for (int step = 0; step < kMaxSteps; ++step) {
+    for (int step = 0; step < kCompetitionRules.max_size_steps; ++step) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const double reached, measure(*e));
-      const double factor = std::clamp(1 / std::sqrt(std::max(reached, 1e-12)), 1 / kMaxGrowth, kMaxGrowth);
-      if (std::abs(factor - 1) < kNear) return true;
+      const double factor = std::clamp(1 / std::sqrt(std::max(reached, 1e-12)), 1 / growth, growth);
+      if (std::abs(factor - 1) < kCompetitionRules.size_tolerance) return true;
       if (*size >= reach && factor > 1) return false;
       (factor > 1 ? below : above) = *size;
       double next = std::min(*size * factor, reach);
@@ -239,7 +239,7 @@ class Detector {
       TOUCHSTONE_ASSIGN_OR_RETURN(*e, expected_.At(m, i, *size, false));
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const double reached, measure(*e));
-    if (reached > 1 - 2 * kNear) return true;
+    if (reached > 1 - 2 * kCompetitionRules.size_tolerance) return true;
     if (!std::isfinite(above)) return false;
     *size = above;
     TOUCHSTONE_ASSIGN_OR_RETURN(*e, expected_.At(m, i, *size, false));

@@ -14,8 +14,6 @@
 
 namespace touchstone::diagnosis::engine {
 
-inline constexpr double kDetectionPower = 0.8;  // share of sets in which an effect of the named size is found
-
 // One value of an effect that the model lacks; the effect's other values change nothing unless the value acts with them
 // only. Sizes are distances from the value that changes nothing, in the unit of files; of a value that acts by its
 // inverse (ParameterInfo::reciprocal) they are the value itself, and a larger one changes less.

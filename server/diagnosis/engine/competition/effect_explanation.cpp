@@ -10,14 +10,12 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/engine/competition/competition.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
 #include "server/diagnosis/engine/search/resemblance.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr size_t kMaxTakenOver = 6;
-constexpr double kWorthNaming = 0.2;  // share of what the effect does
 
 // The extension that stands for an effect: on all objects alike, else the most probable one.
 const Extension* Find(const std::vector<Extension>& extensions, const std::string& effect) {
@@ -81,7 +79,7 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
     const double share = ShareExplained(columns, response);
     const double gain_nats = extension.log_evidence - initial.log_evidence;
     // What gains nothing would have to act the other way.
-    if (share < kWorthNaming || !(gain_nats > 0)) continue;
+    if (share < kCompetitionRules.worth_naming_share || !(gain_nats > 0)) continue;
     const std::string name =
         extension.candidate < 0 ? absl::StrCat(kGivenPrefix, extension.name) : extension.name;
     const auto same =
@@ -93,7 +91,7 @@ absl::StatusOr<std::vector<TakenOver>> FindTakenOver(const StepwiseSearch& searc
   }
   std::stable_sort(taken.begin(), taken.end(),
                    [](const TakenOver& a, const TakenOver& b) { return a.share > b.share; });
-  if (taken.size() > kMaxTakenOver) taken.resize(kMaxTakenOver);
+  if (taken.size() > kCompetitionRules.max_taken_over) taken.resize(kCompetitionRules.max_taken_over);
   return taken;
 }
 

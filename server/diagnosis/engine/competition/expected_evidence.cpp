@@ -6,17 +6,14 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/fit/laplace_evidence.h"
+#include "server/diagnosis/engine/fit/rules.h"
 #include "server/diagnosis/engine/search/resemblance.h"
 #include "server/diagnosis/engine/search/size_grid.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kMaxRivalSteps = 6;       // of Gauss and Newton, to a rival's best values
-constexpr double kRivalArrived = 0.05;  // standard errors
-constexpr double kCostOfParts =
-    1.25;  // of a fitted value on rows of parts of a fifth, which it was not fitted to
 
 std::vector<int> InOrder(int count) {
   std::vector<int> members(count);
@@ -84,7 +81,9 @@ double ExpectedEvidence::RatioNeeded(int m, const ExpectedStep& step) const {
   const int values = extensions_[m].start.size() - own_;
   const double occam_nats = 0.5 * step.ratio - step.gain_nats;
   const double groups = static_cast<double>(experiment_.observations->groups().size());
-  const double cost = groups >= 3 ? groups / (groups - 1) : kCostOfParts;
+  // A fitted value costs more on rows of parts that it was not fitted to.
+  const double parts = groups >= 3 ? groups : kFitRules.folds.value();
+  const double cost = parts / (parts - 1);
   const double kept = 1 - rules.min_relative_cv_gain;
   return std::max(
       {2 * (rules.enter_nats + occam_nats),
@@ -177,10 +176,11 @@ LaplaceEvidence ExpectedEvidence::Linear(const ExpectedStep& step, int m) const 
 absl::StatusOr<ExpectedRival> ExpectedEvidence::Fitted(const ExpectedStep& step, int m) const {
   const Parameterization& start = extensions_[m].start;
   ExpectedRival rival{start.Start(), Linear(step, m)};
-  for (int moves = 0; moves < kMaxRivalSteps; ++moves) {
+  for (int moves = 0; moves < kCompetitionRules.max_rival_steps; ++moves) {
     const Eigen::VectorXd point = start.Clip(rival.point + rival.evidence.step);
     const Eigen::VectorXd errors = rival.evidence.covariance.diagonal().cwiseMax(0).cwiseSqrt();
-    const bool arrived = ((point - rival.point).cwiseAbs().array() <= kRivalArrived * errors.array()).all();
+    const bool arrived =
+        ((point - rival.point).cwiseAbs().array() <= kFitRules.small_step.value() * errors.array()).all();
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted,
                                 experiment_.observations->Predict(start.At(point)));
     TOUCHSTONE_ASSIGN_OR_RETURN(const Eigen::MatrixXd columns,

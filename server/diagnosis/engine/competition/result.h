@@ -24,10 +24,6 @@ enum class Verdict {
 
 enum class EffectScope { kRig, kObject };
 
-// No probability of an explanation is above this: it is one among the causes that somebody has thought of, and the
-// true cause may be another.
-inline constexpr double kMaxProbability = 0.999;
-
 struct Quality {
   double rmse = 0;           // as a comparison finds it
   double heldout_rmse = 0;   // the same on parts of the data that the fit did not see

@@ -8,16 +8,13 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/diagnosis/engine/competition/result.h"
+#include "server/diagnosis/engine/competition/rules.h"
 
 namespace touchstone::diagnosis::engine {
 
-inline constexpr double kUnevenNats = 10;
-inline constexpr double kUnevenRatio = 4.0 / 3;   // of the largest scale over the smallest
-inline constexpr double kAlikeUnevenShare = 0.6;  // of the gain, of what says nearly the same
-
 // Gains of log likelihood below this are what `parts` scales among `count` measurements gain by chance.
 inline double EnoughToBeUneven(double parts, double count) {
-  return kUnevenNats + 0.5 * (parts - 1) * std::log(count);
+  return kCompetitionRules.uneven_nats + 0.5 * (parts - 1) * std::log(count);
 }
 
 // `gain_nats`: of log likelihood, of a scale for each of `parts` parts over one for all. Nothing where one scale says the
@@ -25,8 +22,10 @@ inline double EnoughToBeUneven(double parts, double count) {
 inline std::optional<CovariateTest> TestUneven(const std::string& covariate, double gain_nats, double parts,
                                                double count, double smallest_scale, double largest_scale) {
   const double enough = EnoughToBeUneven(parts, count);
-  if (gain_nats < enough || largest_scale < kUnevenRatio * smallest_scale) return std::nullopt;
-  return CovariateTest{covariate, ChiSquaredTail(2 * gain_nats, parts - 1), gain_nats - enough + kUnevenNats};
+  if (gain_nats < enough || largest_scale < kCompetitionRules.uneven_ratio * smallest_scale)
+    return std::nullopt;
+  return CovariateTest{covariate, ChiSquaredTail(2 * gain_nats, parts - 1),
+                       gain_nats - enough + kCompetitionRules.uneven_nats.value()};
 }
 
 }  // namespace touchstone::diagnosis::engine

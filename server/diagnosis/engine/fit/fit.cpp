@@ -6,15 +6,10 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/fit/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kMaxHalvings = 5;
-constexpr double kConverged = 0.02;  // nats
-constexpr double kSmallStep = 0.05;  // standard errors
-// Derivatives that are simulated, from which updating them saves more than the steps that it adds.
-constexpr int kMinUpdated = 2;
 
 // One simulation with all parameters of one shape moved; writes their columns.
 absl::Status DifferentiateShape(const Experiment& experiment, const Parameterization& model,
@@ -54,7 +49,7 @@ absl::Status DifferentiateShape(const Experiment& experiment, const Parameteriza
 // nothing between. A loss that does not grow like a parabola promises anything.
 bool PromisesNothing(double gain, double gain_of_half) {
   const double slope = 4 * gain_of_half - gain, curvature = gain - slope;
-  return curvature < 0 && (slope <= 0 || slope * slope < -4 * curvature * kConverged);
+  return curvature < 0 && (slope <= 0 || slope * slope < -4 * curvature * kFitRules.converged);
 }
 
 // One fit under way: where it stands, and what the columns there say.
@@ -67,8 +62,8 @@ class GaussNewton {
       rough_.push_back(
           experiment_.observations->HasRoughDerivatives(*model_.base().effects[parameter.effect].effect));
     has_rough_derivatives_ = std::find(rough_.begin(), rough_.end(), true) != rough_.end();
-    updates_ =
-        experiment.update_derivatives && std::count(rough_.begin(), rough_.end(), false) >= kMinUpdated;
+    updates_ = experiment.update_derivatives &&
+               std::count(rough_.begin(), rough_.end(), false) >= kFitRules.min_updated;
   }
 
   // Whether the derivatives behind a step are those of the step before, updated.
@@ -106,7 +101,7 @@ class GaussNewton {
     const int s = evidence.hypothesis;
     const double here = LogPosterior(Likelihood::Pick(fit_->columns, {0}), s, fit_->point);
     Step step;
-    for (int halving = 0; halving <= kMaxHalvings; ++halving, step.fraction /= 2) {
+    for (int halving = 0; halving <= kFitRules.max_halvings; ++halving, step.fraction /= 2) {
       const Eigen::VectorXd point = model_.Clip(fit_->point + step.fraction * evidence.step);
       TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<double> predicted,
                                   experiment_.observations->Predict(model_.At(point)));
@@ -236,9 +231,9 @@ absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization star
     if (!step.moved) continue;
     const LaplaceEvidence after = search.Evidence();
     // A full step that ended where the linearised prediction said needs no further derivatives.
-    const bool as_predicted = step.fraction == 1 && search.DistanceLeft(after) < kSmallStep &&
-                              std::abs(after.log_evidence - evidence.log_evidence) < kConverged;
-    if (step.gain >= kConverged && !as_predicted) continue;
+    const bool as_predicted = step.fraction == 1 && search.DistanceLeft(after) < kFitRules.small_step &&
+                              std::abs(after.log_evidence - evidence.log_evidence) < kFitRules.converged;
+    if (step.gain >= kFitRules.converged && !as_predicted) continue;
     if (simulated) {
       evidence = after;
       break;

@@ -13,6 +13,7 @@
 #include "server/diagnosis/engine/fit/likelihood.h"
 #include "server/diagnosis/engine/fit/observation_model.h"
 #include "server/diagnosis/engine/fit/parameterization.h"
+#include "server/diagnosis/engine/fit/rules.h"
 
 namespace touchstone::diagnosis::engine {
 
@@ -52,8 +53,7 @@ absl::StatusOr<Eigen::MatrixXd> Derivatives(const Experiment& experiment, const 
 
 // `max_iterations` 0 only evaluates the start. `part`: a fit of the first parameters of `start`, if any is known; where
 // derivatives are updated and the others change nothing at the start, its derivatives are taken over.
-inline constexpr int kMaxIterations = 10;
 absl::StatusOr<Fit> FitModel(const Experiment& experiment, Parameterization start,
-                             int max_iterations = kMaxIterations, const Fit* part = nullptr);
+                             int max_iterations = kFitRules.max_iterations, const Fit* part = nullptr);
 
 }  // namespace touchstone::diagnosis::engine

@@ -7,13 +7,10 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/status.h"
+#include "server/diagnosis/engine/fit/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kFolds = 5;             // of blocks, of the time
-constexpr double kUninformed = 1e-3;  // of what all rows say of a value
-constexpr int kRefitIterations = 4;   // a fit without a part begins where the whole one ended
 
 using Folds = std::vector<std::vector<int>>;  // the rows of each part that is left out
 
@@ -31,9 +28,9 @@ Folds GroupFolds(const ObservationModel& observations, const Parameterization& m
 }
 
 Folds BlockFolds(const ObservationModel& observations) {
-  Folds folds(kFolds);
+  Folds folds(kFitRules.folds.value());
   for (int row = 0; row < observations.rows(); ++row)
-    folds[observations.BlockOfRow(row) % kFolds].push_back(row);
+    folds[observations.BlockOfRow(row) % kFitRules.folds].push_back(row);
   return folds;
 }
 
@@ -41,7 +38,7 @@ Folds BlockFolds(const ObservationModel& observations) {
 // rest of the session may say nothing of them. What was measured at one time (a touch, a photograph) is not parted: the
 // half that was seen would tell of the other. Empty where all has one time.
 Folds TimeFolds(const ObservationModel& observations, bool own_values) {
-  Folds folds(kFolds);
+  Folds folds(kFitRules.folds.value());
   const auto divide = [&](int begin, int end) {
     std::vector<int> order(end - begin);
     std::iota(order.begin(), order.end(), begin);
@@ -50,7 +47,7 @@ Folds TimeFolds(const ObservationModel& observations, bool own_values) {
     size_t first = 0;  // of the rows of this time
     for (size_t place = 0; place < order.size(); ++place) {
       if (observations.TimeOfRow(order[place]) != observations.TimeOfRow(order[first])) first = place;
-      folds[first * kFolds / order.size()].push_back(order[place]);
+      folds[first * kFitRules.folds / order.size()].push_back(order[place]);
     }
   };
   const int groups = static_cast<int>(observations.groups().size());
@@ -109,7 +106,7 @@ Parameterization StartWithout(const Fit& fit, const std::vector<int>& left_out) 
     const auto column = fit.columns.values.col(1 + i);
     double inside = 0;
     for (const int row : left_out) inside += column[row] * column[row];
-    if (column.squaredNorm() - inside < kUninformed * column.squaredNorm())
+    if (column.squaredNorm() - inside < kFitRules.uninformed * column.squaredNorm())
       point[i] = fit.model.parameters()[i].neutral;
   }
   Parameterization start = fit.model;
@@ -126,7 +123,8 @@ absl::StatusOr<std::vector<RefitWithoutPart>> Refit(const Experiment& experiment
     const WithoutRows others(*experiment.observations, fold);
     Experiment without = experiment;
     without.observations = &others;
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit again, FitModel(without, StartWithout(fit, fold), kRefitIterations));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit again,
+                                FitModel(without, StartWithout(fit, fold), kFitRules.refit_iterations));
     refits.push_back({fold, std::move(again)});
   }
   return refits;

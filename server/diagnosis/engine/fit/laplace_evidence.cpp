@@ -4,14 +4,10 @@
 #include <cmath>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/engine/fit/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kVisible = 10;  // squared scale over standard error from where a direction counts as visible
-constexpr double kPriorWidth = 10;  // of a value's prior (Cauchy) over the size that rigs show
-constexpr double kUnusualNats = 7;  // that a value beyond what rigs show costs: one rig in a thousand
-constexpr double kRidge = 1e-4;     // prior precision over 1 / scale^2: holds what nothing determines
 
 // The minimum of the quadratic form within bounds, by holding parameters that run out of them there.
 struct Minimum {
@@ -42,7 +38,7 @@ Minimum Minimise(const Eigen::MatrixXd& gram, const std::vector<int>& members,
           b[i] -= gram(ci, members[1 + j]) * m.step[j];
       for (int j = 0; j < n; ++j) a(i, j) = gram(ci, members[1 + m.free[j]]);
       const double scale = parameters[m.free[i]].scale;
-      a(i, i) += kRidge * sigma_squared / (scale * scale) + 1e-300;
+      a(i, i) += kFitRules.ridge * sigma_squared / (scale * scale) + 1e-300;
     }
     const Eigen::VectorXd x = SymmetricSolver(a).Solve(b);
     int out = -1;
@@ -92,7 +88,7 @@ double OccamNats(const Eigen::MatrixXd& information, int rows) {
   const Eigen::VectorXd eigenvalues = EigenvaluesOfSymmetric(information);
   for (int i = 0; i < information.rows(); ++i) {
     const double seen = std::max(eigenvalues[i], 0.0);
-    occam += 0.5 * std::log1p(rows * seen / (seen + kVisible));
+    occam += 0.5 * std::log1p(rows * seen / (seen + kFitRules.visible));
   }
   return occam;
 }
@@ -104,7 +100,7 @@ Eigen::MatrixXd CovarianceOf(const Eigen::MatrixXd& information, const std::vect
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
   Eigen::MatrixXd ridged(n, n);
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) ridged(i, j) = information(i, j) + (i == j ? kRidge : 0);
+    for (int j = 0; j < n; ++j) ridged(i, j) = information(i, j) + (i == j ? kFitRules.ridge.value() : 0);
   const Eigen::MatrixXd inverse = SymmetricSolver(ridged).SolveColumns(Eigen::MatrixXd::Identity(n, n));
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
@@ -127,8 +123,8 @@ double LogPriorOfValues(const std::vector<FreeParameter>& parameters, const Eige
   double sum = 0;
   for (size_t i = 0; i < parameters.size(); ++i) {
     const double value = point[static_cast<int>(i)];
-    if (value < parameters[i].usual_lower || value > parameters[i].usual_upper) sum -= kUnusualNats;
-    const double x = (value - parameters[i].neutral) / (kPriorWidth * parameters[i].scale);
+    if (value < parameters[i].usual_lower || value > parameters[i].usual_upper) sum -= kFitRules.unusual_nats;
+    const double x = (value - parameters[i].neutral) / (kFitRules.prior_width * parameters[i].scale);
     sum += parameters[i].log_prior - std::log1p(x * x);
   }
   return sum;

@@ -7,6 +7,7 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/matern.h"
+#include "server/diagnosis/engine/fit/rules.h"
 #include "server/diagnosis/engine/fit/support_points.h"
 
 namespace touchstone::diagnosis::engine {
@@ -15,8 +16,6 @@ namespace {
 // Correlation lengths over the longest side of the object, and bump sizes (as rows) over sigma.
 constexpr double kLengths[] = {0.04, 0.07, 0.12, 0.2, 0.35};
 constexpr double kRatios[] = {0.08, 0.12, 0.18, 0.27, 0.4, 0.6, 0.9, 1.35, 2, 3, 5, 8, 15, 30};
-constexpr int kMaxPoints = 160;
-constexpr int kMaxWithInner = 128;  // columns
 
 // Features of the field at a group's rows, turned so that they are orthogonal; `energies`: their squared norms.
 Eigen::MatrixXd OrthogonalFeatures(const std::vector<SmoothErrorSite>& sites,
@@ -82,9 +81,9 @@ void Likelihood::MakeBases(const SmoothErrorGeometry& geometry, const std::vecto
       const int l = task / groups, group = task % groups;
       const int first = group_rows_[group], rows = group_rows_[group + 1] - first;
       if (rows == 0) continue;
-      bases_[l].directions[group] =
-          OrthogonalFeatures(geometry.sites[group], SupportPoints(geometry.distinct_m[group], kMaxPoints),
-                             length_m[l], first, rows, &energies[l][group]);
+      bases_[l].directions[group] = OrthogonalFeatures(
+          geometry.sites[group], SupportPoints(geometry.distinct_m[group], kFitRules.max_support_points),
+          length_m[l], first, rows, &energies[l][group]);
     }
   };
   ParallelFor(pool, lengths * groups, 1, make);
@@ -99,7 +98,7 @@ void Likelihood::MakeBases(const SmoothErrorGeometry& geometry, const std::vecto
 
 Likelihood::Columns Likelihood::Prepare(const Eigen::MatrixXd& values) const {
   Columns columns{values, {}, {}};
-  if (values.cols() <= kMaxWithInner) columns.inner = values.transpose() * values;
+  if (values.cols() <= kFitRules.max_columns_with_inner) columns.inner = values.transpose() * values;
   for (const Basis& basis : bases_) {
     Eigen::MatrixXd projected(basis.energies.size(), values.cols());
     int next = 0;
@@ -124,7 +123,7 @@ Likelihood::Columns Likelihood::Join(const Columns& a, const Columns& b) {
     joined << a.projected[l], b.projected[l];
     all.projected.push_back(std::move(joined));
   }
-  if (all.values.cols() <= kMaxWithInner) all.inner = all.values.transpose() * all.values;
+  if (all.values.cols() <= kFitRules.max_columns_with_inner) all.inner = all.values.transpose() * all.values;
   return all;
 }
 

@@ -9,6 +9,7 @@
 #include <absl/status/statusor.h>
 #include <Eigen/Core>
 
+#include "server/diagnosis/engine/fit/rules.h"
 #include "server/model/model.h"
 
 namespace touchstone::diagnosis::engine {
@@ -80,7 +81,7 @@ class ObservationModel {
   // Columns of noise as such fits leave it.
   virtual Eigen::MatrixXd WithoutEliminated(Eigen::MatrixXd noise) const { return noise; }
   // How far a value moves for a derivative, over its parameter's scale.
-  virtual double DerivativeStep() const { return 0.02; }
+  virtual double DerivativeStep() const { return kFitRules.derivative_step; }
   // Whether derivatives by this effect hold only near where the rows were made, and are known roughly even there: what is
   // known to act nearly alike is then told from it by a clear share of what it explains only.
   virtual bool HasRoughDerivatives(const model::Effect&) const { return false; }

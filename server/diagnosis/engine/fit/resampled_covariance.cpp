@@ -6,12 +6,10 @@
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/engine/fit/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr int kResamples = 200;
-constexpr int kMinDistinctBlocks = 3;  // fewer need not determine the values at all
 
 // Normal equations of one block.
 struct BlockEquations {
@@ -41,11 +39,13 @@ Eigen::MatrixXd ResampledCovariance(const Experiment& experiment, const Fit& fit
   const int size = fit.model.size();
   std::vector<Eigen::VectorXd> steps;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
-  for (int draw = 0; draw < kResamples; ++draw) {
+  for (int draw = 0; draw < kFitRules.resamples; ++draw) {
     RandomStream random(seed, RandomDomain::kDiagnosis, static_cast<uint64_t>(draw));
     std::vector<int> times(blocks.size(), 0);
     for (size_t k = 0; k < blocks.size(); ++k) ++times[random.Below(blocks.size())];
-    if (std::count_if(times.begin(), times.end(), [](int n) { return n > 0; }) < kMinDistinctBlocks) continue;
+    if (std::count_if(times.begin(), times.end(), [](int n) { return n > 0; }) <
+        kFitRules.min_distinct_blocks)
+      continue;
     Eigen::MatrixXd left = Eigen::MatrixXd::Zero(size, size);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
     for (size_t k = 0; k < blocks.size(); ++k)

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/fit/linear_test_model.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/effects/all_effects.h"
@@ -48,7 +49,7 @@ TEST_F(CompetitionTest, EffectWithTheSameColumnIsEquivalentAndSharesTheProbabili
   ASSERT_TRUE(steps.ok() && steps->size() == 1);
   ASSERT_FALSE((*steps)[0].competing.empty());
   EXPECT_TRUE((*steps)[0].competing[0].equivalent);
-  EXPECT_EQ((*steps)[0].probability, kMaxProbability);
+  EXPECT_EQ((*steps)[0].probability, kCompetitionRules.max_probability.value());
 }
 
 TEST_F(CompetitionTest, EffectWithAnotherColumnIsNotEquivalent) {
@@ -71,7 +72,7 @@ TEST_F(CompetitionTest, NamelessRivalOfEqualEvidenceHalvesTheProbability) {
   EXPECT_NEAR((*steps)[0].probability, 0.5, 1e-6);
   EXPECT_EQ((*steps)[0].words, "A course says the same.");
   const auto far = FindCompetitors(search, whole, -1, {{"object_push", {-20, "A course says the same."}}});
-  EXPECT_EQ((*far)[0].probability, kMaxProbability);
+  EXPECT_EQ((*far)[0].probability, kCompetitionRules.max_probability.value());
   EXPECT_EQ((*far)[0].words, "");
 }
 

@@ -7,22 +7,20 @@
 #include <utility>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/competition/rules.h"
+#include "server/diagnosis/engine/ladder/rules.h"
 #include "server/diagnosis/engine/ladder/where_in_words.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kZeroErrors = 2;       // standard errors of a value that may be zero
-constexpr double kZero = 1e-6;          // ... or this share of the typical size
-constexpr double kDoubted = 0.5;        // probability of a step that explains nothing of what is left
-constexpr double kMaxBesideRest = 0.9;  // ... of one that explains all but a trace
 
 bool IsZero(const model::Effect& effect, const std::vector<ParameterEstimate>& estimates) {
   for (const ParameterEstimate& e : estimates)
     for (const model::ParameterInfo& parameter : effect.parameters)
       if (parameter.name == e.name &&
           (parameter.reciprocal || std::abs(e.value - parameter.neutral) >
-                                       std::max(kZeroErrors * e.std_error, kZero * parameter.typical)))
+                                       std::max(kLadderRules.zero_errors * e.std_error,
+                                                kCompetitionRules.value_tolerance * parameter.typical)))
         return false;
   return true;
 }
@@ -130,8 +128,10 @@ void Conclude(const Hypotheses& found, double explained_share, Improvement* impr
       VerdictOf(found.Leave(Leaves::kBeside), !improvement->steps.empty(), improvement->values_wrong);
   if (improvement->changed && !improvement->improved.name.empty()) improvement->improved.name += "_better";
   if (!found.Leave(Leaves::kMeans)) return;
-  const double most =
-      found.Leave(Leaves::kDoubts) ? kDoubted : kDoubted + (kMaxBesideRest - kDoubted) * explained_share;
+  const double doubted = kLadderRules.doubted;
+  const double most = found.Leave(Leaves::kDoubts)
+                          ? doubted
+                          : doubted + (kLadderRules.max_beside_rest - doubted) * explained_share;
   for (LadderStep& step : improvement->steps) {
     step.probability = std::min(step.probability, most);
     AddWords("Beside it a rest remains unexplained: it may stand in for something else.", &step);

@@ -7,13 +7,11 @@
 #include <utility>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/ladder/rules.h"
 #include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kDoubtful = 0.5;  // a step that is less probable is rather none
-constexpr int kMaxFits = 80;       // of one search for an order; six steps need 21 where the first order does
 
 // The model with only those of its further effects that are in `kept`.
 Parameterization Only(const Parameterization& model, int initial_effects, const std::set<int>& kept) {
@@ -99,7 +97,7 @@ class Orderer {
   // Whether the others follow those kept in some order; `chosen_` has it.
   absl::StatusOr<bool> Extend(const Effects& kept, const Quality& last) {
     if (IsLast(kept)) return true;
-    if (dead_ends_.count(kept) > 0 || static_cast<int>(fits_.size()) > kMaxFits) return false;
+    if (dead_ends_.count(kept) > 0 || static_cast<int>(fits_.size()) > kLadderRules.max_fits) return false;
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto next, Next(kept));
     for (const auto& [step, with] : next) {
       TOUCHSTONE_ASSIGN_OR_RETURN(const Quality quality, QualityOf(*step, with, last));
@@ -176,7 +174,7 @@ class Orderer {
 }  // namespace
 
 bool Falls(const Quality& before, const Quality& after, const SelectedStep& step) {
-  const double kept = step.probability < kDoubtful ? 1 - SearchRules().min_relative_cv_gain : 1;
+  const double kept = step.probability < kLadderRules.doubtful ? 1 - SearchRules().min_relative_cv_gain : 1;
   return after.rmse < before.rmse && after.heldout_rmse < kept * before.heldout_rmse;
 }
 

@@ -6,11 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/diagnosis/engine/ladder/rules.h"
+
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kAgreeErrors = 1.5;  // standard errors between fingers that agree
-constexpr double kDifferErrors = 6;   // ... between one that differs and their mean
 
 std::string Objects(const std::string& only, bool per_object) {
   if (!only.empty()) return absl::StrCat("on ", only, " only");
@@ -29,8 +28,8 @@ std::string OnlyFinger(const std::vector<ParameterEstimate>& values) {
       lowest = std::min(lowest, values[j].value), highest = std::max(highest, values[j].value);
       mean += values[j].value / (count - 1);
     }
-    const bool agree = highest - lowest <= kAgreeErrors * std::sqrt(2.0) * error;
-    if (!agree || !(std::abs(values[i].value - mean) > kDifferErrors * error)) continue;
+    const bool agree = highest - lowest <= kLadderRules.agree_errors * std::sqrt(2.0) * error;
+    if (!agree || !(std::abs(values[i].value - mean) > kLadderRules.differ_errors * error)) continue;
     if (!only.empty()) return "";
     only = values[i].entry;
   }

@@ -8,13 +8,11 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/engine/search/grid_scores.h"
+#include "server/diagnosis/engine/search/rules.h"
 #include "server/diagnosis/engine/search/stepwise_search.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kVisibleChange = 1e-9;  // s of change at the typical size
-constexpr size_t kMaxExactOnOne = 12;    // effects by object that are scored under every hypothesis
 
 // Inner products of the residual, the fit's own columns and those of the extensions, under one hypothesis.
 class ScoringGram {
@@ -65,7 +63,7 @@ class Scorer {
     EvaluateEach(screened, Few());
     std::sort(screened.begin(), screened.end(),
               [&](int a, int b) { return extensions_[a].log_evidence > extensions_[b].log_evidence; });
-    if (screened.size() > kMaxExactOnOne) screened.resize(kMaxExactOnOne);
+    if (screened.size() > kCandidateRules.max_exact_on_one) screened.resize(kCandidateRules.max_exact_on_one);
     exact.insert(exact.end(), screened.begin(), screened.end());
     EvaluateEach(exact, All());
     return absl::OkStatus();
@@ -184,7 +182,7 @@ class Scorer {
           group < 0 ? static_cast<int>(wide_.rows()) : experiment_.observations->FirstRowOfGroup(group + 1);
       visible |= wide_.col(member.column - 1 - own_).segment(begin, end - begin).norm() *
                      extension.start.parameters()[i].scale >
-                 kVisibleChange * std::sqrt(static_cast<double>(end - begin));
+                 kCandidateRules.visible_change * std::sqrt(static_cast<double>(end - begin));
     }
     return visible;
   }

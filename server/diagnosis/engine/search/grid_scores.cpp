@@ -6,12 +6,11 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/search/rules.h"
 #include "server/diagnosis/engine/search/size_grid.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kMoves = 1e-9;  // s of change
 
 class GridScorer {
  public:
@@ -101,7 +100,8 @@ class GridScorer {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> predicted,
                                 experiment_.observations->Predict(start.At(tried->point)));
     const Eigen::VectorXd response = experiment_.observations->Change(fit_.predicted, predicted);
-    tried->moves = response.norm() > kMoves * std::sqrt(static_cast<double>(response.size()));
+    tried->moves =
+        response.norm() > kCandidateRules.visible_change * std::sqrt(static_cast<double>(response.size()));
     if (!tried->moves) return absl::OkStatus();
     Eigen::MatrixXd values(response.size(), own_ + 2);
     values << experiment_.observations->Residual(predicted), fit_.columns.values.middleCols(1, own_),

@@ -8,15 +8,10 @@
 #include <utility>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/engine/search/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kFewShare = 0.01;      // of the measurements: more are no slips of single readings
-constexpr double kSlipsShare = 0.005;   // of single slips, however far off
-constexpr double kFarAboveNoise = 1.3;  // errors over the noise, that a few gross errors do not bring about
-constexpr double kTogetherP = 1e-3;     // of standing together by chance, over all divisions
-constexpr double kBeyondNoise = 1e-4;   // of the measurements, that noise alone may set aside
 
 // Probability of at least `hits` of `drawn` measurements in a group of `group` among `all` (hypergeometric).
 double AtLeast(int hits, int drawn, int group, int all) {
@@ -75,7 +70,8 @@ Shared SharedGroups(const std::vector<char>& aside, const std::vector<Division>&
   Shared all;
   for (const auto& [p, group] : shared) {
     all.p = std::min(all.p, p * looked_at);
-    if (p * looked_at < kTogetherP) absl::StrAppend(&all.words, all.words.empty() ? "" : ", ", group);
+    if (p * looked_at < kCandidateRules.together_p)
+      absl::StrAppend(&all.words, all.words.empty() ? "" : ", ", group);
   }
   return all;
 }
@@ -95,14 +91,14 @@ SetAside AssessSetAside(const std::vector<char>& aside, const std::vector<Divisi
       assessed.count, assessed.of, plural, 100 * share);
   const Shared shared = SharedGroups(aside, divisions);
   const double neighbours_p = NeighboursP(aside, assessed.count);
-  const bool single = assessed.count <= slips && share <= kSlipsShare;
-  const bool grouped = !shared.words.empty(), neighbours = neighbours_p < kTogetherP;
-  assessed.is_finding =
-      share > kFewShare || grouped || neighbours || (!single && noise > 0 && rmse > kFarAboveNoise * noise);
+  const bool single = assessed.count <= slips && share <= kCandidateRules.slips_share;
+  const bool grouped = !shared.words.empty(), neighbours = neighbours_p < kCandidateRules.together_p;
+  assessed.is_finding = share > kCandidateRules.few_share || grouped || neighbours ||
+                        (!single && noise > 0 && rmse > kCandidateRules.far_above_noise * noise);
   if (assessed.is_finding) {
     const double far_off =
         noise > 0 ? ChiSquaredTail(assessed.of * rmse * rmse / (noise * noise), assessed.of) : 1;
-    const double many = PoissonTail(assessed.count, kBeyondNoise * assessed.of);
+    const double many = PoissonTail(assessed.count, kCandidateRules.beyond_noise_share * assessed.of);
     constexpr int kLookedAt = 4;
     assessed.p = std::min(kLookedAt * std::min({shared.p, neighbours_p, many, far_off}), 1.0);
   }

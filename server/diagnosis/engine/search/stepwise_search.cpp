@@ -10,16 +10,11 @@
 #include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
+#include "server/diagnosis/engine/fit/rules.h"
+#include "server/diagnosis/engine/search/rules.h"
 
 namespace touchstone::diagnosis::engine {
 namespace {
-
-constexpr double kNearPrediction = 40;  // nats: candidates this far behind the best prediction are not fitted
-constexpr double kPoorPrediction =
-    0.5;  // ... or this share of the evidence behind the fit, for strong effects
-constexpr int kFormulaStarts = 8;
-constexpr size_t kMaxPairs = 3;       // that are fitted in full
-constexpr double kNegligible = 1e-3;  // of a held-out part's squares, over the noise's square
 
 std::string InWords(const Extension& extension) {
   return extension.object.empty() ? extension.name : absl::StrCat(extension.name, " on ", extension.object);
@@ -57,7 +52,8 @@ absl::StatusOr<bool> StepwiseSearch::FallsHeldOut(const Fit& before, const Fit& 
   if (rules_.min_cv_gain_std_errors > 0) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> had, HeldOutSquaresRefitted(experiment_, before));
     TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<double> has, HeldOutSquaresRefitted(experiment_, after));
-    const HeldOutFall fall = FallOfHeldOut(had, has, kNegligible * after.sigma * after.sigma);
+    const HeldOutFall fall =
+        FallOfHeldOut(had, has, kCandidateRules.negligible_share * after.sigma * after.sigma);
     if (!(fall.mean > rules_.min_cv_gain_std_errors * fall.std_error)) return false;
   }
   // Values of single objects cannot be predicted from other objects.
@@ -77,7 +73,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, con
   if (extension.acts_at) starts.push_back(*extension.acts_at);
   if (effect != nullptr && effect->formula != nullptr && candidates_[extension.candidate].of_user) {
     // Nothing is known of a user's formula: starts all over its bounds.
-    for (int k = 0; k < kFormulaStarts; ++k) {
+    for (int k = 0; k < kCandidateRules.formula_starts; ++k) {
       Eigen::VectorXd point = extension.start.Start();
       RandomStream random(k, RandomDomain::kDiagnosis, 77);
       for (int i = 0; i < size; ++i) {
@@ -91,7 +87,7 @@ absl::StatusOr<Fit> StepwiseSearch::FitExtension(const Extension& extension, con
   }
   absl::StatusOr<Fit> best = absl::InternalError("no fit");
   for (Parameterization& start : starts) {
-    absl::StatusOr<Fit> fit = FitModel(experiment_, std::move(start), kMaxIterations, from);
+    absl::StatusOr<Fit> fit = FitModel(experiment_, std::move(start), kFitRules.max_iterations, from);
     if (!fit.ok() && fit.status().code() == absl::StatusCode::kCancelled) return fit;
     if (fit.ok() && (!best.ok() || fit->log_evidence > best->log_evidence)) best = std::move(fit);
     if (!best.ok() && !fit.ok()) best = fit.status();
@@ -110,10 +106,11 @@ absl::StatusOr<std::vector<StepwiseSearch::Tried>> StepwiseSearch::LikelyExtensi
   for (const Extension& extension : extensions) {
     const bool unreached = extension.acts_at.has_value();
     const bool user = extension.candidate >= 0 && candidates_[extension.candidate].of_user;
-    const bool near = extension.visible &&
-                      (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
-                      extension.log_evidence > extensions[0].log_evidence - kNearPrediction &&
-                      extension.log_evidence > from.log_evidence;
+    const bool near =
+        extension.visible &&
+        (extension.rare ? fitted_rare < rules_.max_rare_refits : fitted < rules_.max_refits) &&
+        extension.log_evidence > extensions[0].log_evidence - kCandidateRules.near_prediction_nats &&
+        extension.log_evidence > from.log_evidence;
     if (!near && (extension.rare || (!unreached && !user))) continue;
     progress_(absl::StrCat("fitting ", InWords(extension)));
     (extension.rare ? fitted_rare : fitted) += near;
@@ -163,13 +160,14 @@ absl::StatusOr<bool> StepwiseSearch::AddTwo(const std::vector<Extension>& extens
                                             Explanation* explanation) const {
   const Fit& from = explanation->fit;
   std::optional<Tried> best;
-  for (size_t k = 0; k < pairs.size() && k < kMaxPairs; ++k) {
+  for (size_t k = 0; k < pairs.size() && k < kCandidateRules.max_pairs; ++k) {
     if (pairs[k].log_evidence < from.log_evidence + 2 * rules_.enter_nats) break;
     const Extension& second = extensions[pairs[k].second];
     progress_(absl::StrCat("fitting ", InWords(extensions[pairs[k].first]), " and ", InWords(second)));
     Parameterization both = extensions[pairs[k].first].start;
     Extend(second, &both);
-    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit, FitModel(experiment_, std::move(both), kMaxIterations, &from));
+    TOUCHSTONE_ASSIGN_OR_RETURN(Fit fit,
+                                FitModel(experiment_, std::move(both), kFitRules.max_iterations, &from));
     if (!best || fit.log_evidence > best->fit.log_evidence) best = {std::move(fit), pairs.size(), false};
   }
   if (!best || best->fit.log_evidence < from.log_evidence + 2 * rules_.enter_nats || !IsLikely(from, *best))
@@ -213,7 +211,8 @@ absl::StatusOr<std::vector<CompetingFit>> StepwiseSearch::CompetingFits(const Ex
   competing.push_back({NameOf(own), own_per_object, own_object, false, explanation.fit});
   // The linearised prediction is good to about a share of what there is to explain.
   const double gain_nats = explanation.fit.log_evidence - without.log_evidence;
-  const double near = std::max(kNearPrediction, kPoorPrediction * gain_nats);
+  const double near = std::max(kCandidateRules.near_prediction_nats.value(),
+                               kCandidateRules.poor_prediction_share * gain_nats);
   int fitted = 0, fitted_rare = 0;
   for (const Extension& extension : extensions) {
     // A value of the model that is set free competes like any effect.
@@ -252,7 +251,8 @@ absl::StatusOr<bool> StepwiseSearch::SwapStep(Explanation* explanation) const {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<CompetingFit> competing, CompetingFits(*explanation, index));
     if (competing.size() < 2) continue;
     const bool larger = competing[1].fit.model.size() > explanation->fit.model.size();
-    if (competing[1].fit.log_evidence <= explanation->fit.log_evidence + (larger ? rules_.swap_nats : 0.5))
+    if (competing[1].fit.log_evidence <=
+        explanation->fit.log_evidence + (larger ? rules_.swap_nats : kCandidateRules.swap_equal_nats.value()))
       continue;
     explanation->fit = std::move(competing[1].fit);
     return true;

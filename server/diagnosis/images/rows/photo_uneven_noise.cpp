@@ -9,6 +9,7 @@
 #include <functional>
 #include <numeric>
 
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/competition/uneven_parts.h"
 #include "server/diagnosis/images/pixels/photo_cells.h"
 #include "server/diagnosis/images/pixels/rules.h"
@@ -195,7 +196,8 @@ std::optional<UnevenNoise> FindUnevenNoise(const Photographs& p, const std::vect
     if (own.size() <= kPhotoRowRules.parts_shown || j == 0 || j + 1 == own.size())
       parts.push_back(absl::StrFormat("%s %.2g", own[j].name, search.Scale(own[j])));
   for (size_t j = 0; j < all.size(); ++j)
-    if (j != best && tests[j] && tests[j]->gain_nats > engine::kAlikeUnevenShare * tests[best]->gain_nats)
+    if (j != best && tests[j] &&
+        tests[j]->gain_nats > engine::kCompetitionRules.alike_uneven_share * tests[best]->gain_nats)
       alike.push_back(all[j].by);
   UnevenNoise found;
   found.test = *tests[best];

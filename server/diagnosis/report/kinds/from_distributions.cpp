@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/effects/all_effects.h"
 #include "server/model/finger_name.h"
@@ -88,7 +89,7 @@ void AddNoiseChange(const PoseFreeComparison& comparison, Diagnosis* diagnosis) 
   }
   Step step;
   step.effect = effect->name;
-  step.probability = engine::kMaxProbability;
+  step.probability = engine::kCompetitionRules.max_probability;
   step.meaning = effect->meaning;
   step.check_on_rig = effect->check_on_rig;
   step.remedy = effect->remedy;

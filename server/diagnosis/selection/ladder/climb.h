@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/diagnosis/engine/fit/rules.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 
 namespace touchstone::diagnosis::selection {
@@ -26,6 +27,6 @@ absl::StatusOr<Climb> ClimbSteps(const Workspace& workspace, const SelectionResu
 
 // The fit on every touch, where the search saw a part of them and no surface error stands in the way.
 absl::StatusOr<engine::Fit> FitAll(const Workspace& workspace, const engine::Fit& fit,
-                                   int max_iterations = engine::kMaxIterations);
+                                   int max_iterations = engine::kFitRules.max_iterations);
 
 }  // namespace touchstone::diagnosis::selection

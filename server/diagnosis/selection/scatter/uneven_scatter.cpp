@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/diagnosis/engine/competition/rules.h"
 #include "server/diagnosis/engine/competition/uneven_parts.h"
 #include "server/diagnosis/selection/scatter/rules.h"
 #include "server/diagnosis/touches/noise/rules.h"
@@ -267,7 +268,9 @@ std::optional<UnevenScatter> WorstPartition(const View& view, const std::vector<
   UnevenScatter& scatter = found[best];
   std::vector<std::string> alike;
   for (size_t j = 0; j < found.size(); ++j) {
-    if (j == best || found[j].test.gain_nats < engine::kAlikeUnevenShare * scatter.test.gain_nats) continue;
+    if (j == best ||
+        found[j].test.gain_nats < engine::kCompetitionRules.alike_uneven_share * scatter.test.gain_nats)
+      continue;
     scatter.alike.push_back(found[j].test);
     alike.push_back(by[j]);
   }
