@@ -1,6 +1,7 @@
 #include "server/diagnosis/answers/session_posterior.h"
 
 #include "server/diagnosis/joint/between_sessions.h"
+#include "server/diagnosis/joint/rules.h"
 #include "server/model/value_names.h"
 
 namespace touchstone::diagnosis {
@@ -11,7 +12,7 @@ std::optional<double> ScatterOf(const joint::ComparedValue& value) {
   std::vector<joint::SessionEstimate> known;
   for (const auto& estimate : value.by_session)
     if (estimate && estimate->std_error > 0) known.push_back({estimate->value, estimate->std_error});
-  if (known.size() < joint::kMinForScatter) return std::nullopt;
+  if (known.size() < joint::kJointRules.min_for_scatter) return std::nullopt;
   return joint::MakeControlChart(known).inside.std_deviation;
 }
 

@@ -4,17 +4,18 @@
 #include <cmath>
 #include <utility>
 
+#include "server/diagnosis/joint/rules.h"
+
 namespace touchstone::diagnosis::joint {
 namespace {
-
-constexpr double kLimitDeviations = 3;  // Shewhart's limits
 
 // What other sessions let expect of one, and how far it lies from their mean, over the distance of the limits.
 std::pair<ControlLimits, double> LimitsFrom(const std::vector<SessionEstimate>& others,
                                             const SessionEstimate& own) {
   const BetweenSessions between = EstimateBetweenSessions(others);
   const double distance =
-      kLimitDeviations * std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
+      kJointRules.limit_deviations *
+      std::hypot(std::hypot(between.std_deviation, between.mean_std_error), own.std_error);
   const double excess = std::abs(own.value - between.mean) / distance;
   return {{between.mean - distance, between.mean + distance, excess > 1}, excess};
 }
@@ -58,7 +59,7 @@ ControlChart MakeControlChart(const std::vector<SessionEstimate>& sessions) {
       if (inside[i] && i != but) list.push_back(sessions[i]);
     return list;
   };
-  if (sessions.size() >= kMinForLimits) {
+  if (sessions.size() >= kJointRules.min_for_limits) {
     chart.limits.resize(sessions.size());
     for (size_t left = sessions.size();; --left) {
       size_t farthest = 0;
@@ -69,7 +70,7 @@ ControlChart MakeControlChart(const std::vector<SessionEstimate>& sessions) {
         if (inside[i] && excess > most) farthest = i, most = excess;
       }
       // Of three no one can be told from the other two.
-      if (most <= 1 || left < kMinForLimits) break;
+      if (most <= 1 || left < kJointRules.min_for_limits) break;
       inside[farthest] = 0;
     }
   }

@@ -17,12 +17,9 @@ struct BetweenSessions {
 };
 BetweenSessions EstimateBetweenSessions(const std::vector<SessionEstimate>& sessions);
 
-inline constexpr size_t kMinForScatter = 3;  // sessions; of fewer no scatter is told
-
 // What the other sessions let expect of each, three standard deviations to either side: of the scatter between them, of their
 // mean, and of the session's own value. A session outside is no evidence of the others' scatter: the one farthest outside is
 // set aside, then the next.
-inline constexpr size_t kMinForLimits = 4;  // sessions; of fewer there are no limits
 struct ControlLimits {
   double lower = 0, upper = 0;
   bool outside = false;  // the session's value

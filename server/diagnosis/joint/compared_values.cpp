@@ -5,13 +5,10 @@
 
 #include "server/base/numbers/normal.h"
 #include "server/diagnosis/joint/between_sessions.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
-
-constexpr double kChangedErrors = 3;    // of a single entry, where its effect has changed
-constexpr double kRunErrors = 3;        // between a session and the mean of those before it
-constexpr double kGradientStep = 1e-4;  // over the parameter's scale
 
 // How far each entry of a description moves with each of the session's values; the entries' unit over SI.
 Eigen::MatrixXd GradientsOf(const engine::Parameterization& model, int effect, const Eigen::VectorXd& point) {
@@ -20,7 +17,7 @@ Eigen::MatrixXd GradientsOf(const engine::Parameterization& model, int effect, c
   for (int i = 0; i < model.size(); ++i) {
     const engine::FreeParameter& parameter = model.parameters()[i];
     if (parameter.effect != effect) continue;
-    double step = kGradientStep * parameter.scale;
+    double step = kJointRules.gradient_step * parameter.scale;
     if (point[i] + step > parameter.upper) step = -step;
     Eigen::VectorXd moved = point;
     moved[i] += step;
@@ -110,7 +107,7 @@ class GroupDescriber {
     for (size_t e = 0; e < compared->entries.size(); ++e) {
       ComparedValue& value = compared->entries[e];
       const bool apart =
-          state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kChangedErrors);
+          state(g) == SessionValues::kOwn && (errors[e] == most || errors[e] >= kJointRules.changed_errors);
       SetVerdict(apart, choice_.IsCompared(g) && value.std_error > 0 && Unmoved(sessions, e, value), &value);
     }
   }
@@ -155,7 +152,8 @@ std::vector<SessionRun> RunsOf(const ComparedValue& value) {
     const SessionEstimate own = {value.by_session[session]->value, value.by_session[session]->std_error};
     if (!runs.empty()) {
       SessionEstimate& mean = runs.back().mean;
-      if (std::abs(own.value - mean.value) <= kRunErrors * std::hypot(own.std_error, mean.std_error)) {
+      if (std::abs(own.value - mean.value) <=
+          kJointRules.run_errors * std::hypot(own.std_error, mean.std_error)) {
         runs.back().sessions.push_back(static_cast<int>(session));
         if (!(own.std_error > 0 && mean.std_error > 0)) continue;
         const double weight = 1 / (own.std_error * own.std_error);
@@ -191,7 +189,7 @@ void SetVerdict(bool apart, bool steady, ComparedValue* value) {
   value->change = apart                ? ValueChange::kChanged
                   : steady && !outside ? ValueChange::kUnchanged
                                        : ValueChange::kCannotSay;
-  value->scatter = apart && known.size() >= kMinForScatter ? chart.inside.std_deviation : 0;
+  value->scatter = apart && known.size() >= kJointRules.min_for_scatter ? chart.inside.std_deviation : 0;
   value->runs = apart ? RunsOf(*value) : std::vector<SessionRun>();
 }
 

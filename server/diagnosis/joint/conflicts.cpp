@@ -4,12 +4,10 @@
 #include <utility>
 
 #include "server/base/status.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
-
-constexpr double kConflictNats = 9;  // that values of their own need over one value
-constexpr double kConflictP = 1e-4;  // ... and of values so far apart by chance
 
 bool HasName(const std::vector<SharedEffect>& effects, const std::string& name) {
   return std::any_of(effects.begin(), effects.end(),
@@ -59,7 +57,7 @@ void AddConflict(const std::string& name, const std::pair<int, AloneValues>& a,
           one.covariance(same[r].first, same[c].first) + other.covariance(same[r].second, same[c].second);
   }
   const double p = engine::WaldP(difference, covariance);
-  if (p > kConflictP) return;
+  if (p > kJointRules.conflict_p) return;
   conflicts->push_back({name,
                         {a.first, b.first},
                         {one.fit.model.Describe(one.index, one.fit.point, one.covariance),
@@ -82,7 +80,7 @@ absl::StatusOr<std::vector<Conflict>> FindConflicts(const Sides& sides, const Sh
   TOUCHSTONE_ASSIGN_OR_RETURN(const JointFit apart,
                               FitJointly(parts, [](const engine::Parameterization&, int) { return true; }));
   const double ahead = apart.log_evidence - selection.best.fit.log_evidence;
-  if (ahead < kConflictNats) return conflicts;
+  if (ahead < kJointRules.conflict_nats) return conflicts;
   for (const SharedEffect& effect : in_doubt) {
     std::vector<std::pair<int, AloneValues>> alone;
     for (const Side& side : sides) {

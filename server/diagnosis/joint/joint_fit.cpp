@@ -5,12 +5,11 @@
 #include <numeric>
 
 #include "server/base/status.h"
+#include "server/diagnosis/engine/fit/rules.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
-
-constexpr int kMaxIterations = 15, kMaxHalvings = 6, kNoisePasses = 6;
-constexpr double kConvergedNats = 0.02;
 
 using engine::Likelihood;
 
@@ -51,14 +50,14 @@ class JointGaussNewton {
     TOUCHSTONE_RETURN_IF_ERROR(Predict(point, &states_));
     for (int kind = 0; kind < kinds_; ++kind) TOUCHSTONE_RETURN_IF_ERROR(Linearise(kind));
     for (int kind = 0; kind < kinds_; ++kind) hypothesis_[kind] = Alone(kind).hypothesis;
-    for (int iteration = 0; iteration < kMaxIterations && point.size() > 0; ++iteration) {
+    for (int iteration = 0; iteration < kJointRules.max_iterations && point.size() > 0; ++iteration) {
       if (iteration > 0)
         for (int kind = 0; kind < kinds_; ++kind) TOUCHSTONE_RETURN_IF_ERROR(Linearise(kind));
       const double here = Objective(states_, point);
       const Eigen::VectorXd step = Step(point).step;
       double gain = 0;
       Eigen::VectorXd moved;
-      for (int halving = 0; halving <= kMaxHalvings; ++halving) {
+      for (int halving = 0; halving <= kJointRules.max_halvings; ++halving) {
         moved = Clip(point + std::ldexp(1.0, -halving) * step);
         std::vector<State> states(kinds_);
         TOUCHSTONE_RETURN_IF_ERROR(Predict(moved, &states));
@@ -72,7 +71,7 @@ class JointGaussNewton {
         point = moved;
         break;
       }
-      if (!(gain > kConvergedNats)) break;
+      if (!(gain > engine::kFitRules.converged)) break;
     }
     return Finish(point);
   }
@@ -161,7 +160,7 @@ class JointGaussNewton {
     std::vector<int> members(size + 1);
     std::iota(members.begin(), members.end(), 0);
     engine::LaplaceEvidence found;
-    for (int pass = 0; pass < kNoisePasses; ++pass) {
+    for (int pass = 0; pass < kJointRules.noise_passes; ++pass) {
       Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(size + 1, size + 1);
       for (int kind = 0; kind < kinds_; ++kind) {
         const double sigma = parts_[kind].experiment->likelihood->Sigma(q[kind], 0);

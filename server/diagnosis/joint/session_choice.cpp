@@ -5,15 +5,10 @@
 #include <utility>
 
 #include "server/base/numbers/distributions.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
-namespace {
-
-constexpr double kChangedP = 0.01;  // by chance, over all effects that are compared
-constexpr double kChangedNats = 1;  // of log evidence, that values of their own need beside
-constexpr int kMaxMoves = 100;
-
-}  // namespace
+namespace {}  // namespace
 
 SessionStates WithState(SessionStates states, int group, SessionValues state) {
   states[group] = state;
@@ -26,7 +21,7 @@ SessionChoice::SessionChoice(const SessionEvidence& evidence) : evidence_(eviden
     compared_ += IsCompared(g);
   }
   chosen_ = evidence_.Of(states_);
-  for (int moves = 0; moves < kMaxMoves && (MakeFewer() || MakeMore() || Swap()); ++moves) {
+  for (int moves = 0; moves < kJointRules.max_moves && (MakeFewer() || MakeMore() || Swap()); ++moves) {
   }
 }
 
@@ -39,7 +34,8 @@ double SessionChoice::PApart(const SharedEvidence& one, const SharedEvidence& ap
 }
 
 bool SessionChoice::IsApart(const SharedEvidence& one, const SharedEvidence& apart) const {
-  return PApart(one, apart) <= kChangedP && apart.log_evidence - one.log_evidence >= kChangedNats;
+  return PApart(one, apart) <= kJointRules.changed_p &&
+         apart.log_evidence - one.log_evidence >= kJointRules.changed_nats;
 }
 
 // Takes the values that are needed least: one for all sessions in the place of each session's, the given ones in the place of
@@ -52,7 +48,7 @@ bool SessionChoice::MakeFewer() {
     const bool own = states_[g] == SessionValues::kOwn;
     Move move{WithState(states_, g, own ? SessionValues::kShared : SessionValues::kGiven), {}};
     move.evidence = evidence_.Of(move.states);
-    const double least = own ? kChangedNats : evidence_.groups()[g].least_nats;
+    const double least = own ? kJointRules.changed_nats.value() : evidence_.groups()[g].least_nats;
     const double gain = chosen_.log_evidence - move.evidence.log_evidence;
     if (own ? IsApart(move.evidence, chosen_) : gain >= least) continue;
     if (best && least - gain <= best_lack) continue;
@@ -90,7 +86,7 @@ bool SessionChoice::Swap() {
       if (!IsCompared(h) || states_[h] == SessionValues::kOwn) continue;
       Move move{WithState(without, h, SessionValues::kOwn), {}};
       move.evidence = evidence_.Of(move.states);
-      if (move.evidence.log_evidence <= chosen_.log_evidence + kChangedNats) continue;
+      if (move.evidence.log_evidence <= chosen_.log_evidence + kJointRules.changed_nats) continue;
       Take(std::move(move));
       return true;
     }

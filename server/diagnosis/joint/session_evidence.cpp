@@ -9,14 +9,12 @@
 
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
 
 constexpr int kStretches[] = {8, 24};  // of a session, in which errors may drift
-constexpr double kChance = 1e-3;       // of blocks that scatter so much by chance, over all that is tried
-constexpr double kMovedShare =
-    1e-3;  // of a column's largest entry: a row that moves so little does not count as moved
 
 // Rows by what they may share an error with: the repeats of a pose, stretches of the session.
 std::vector<std::vector<int>> GroupingsOf(const engine::ObservationModel& rows) {
@@ -57,8 +55,8 @@ double VarianceFactor(const engine::ObservationModel& rows, const engine::Fit& f
   const Eigen::MatrixXd& columns = fit.columns.values;
   if (fit.hypothesis != 0 || !(fit.sigma > 0) || columns.cols() < 2) return 1;
   const std::vector<std::vector<int>> groupings = GroupingsOf(rows);
-  const double chance =
-      kChance / (static_cast<double>(groupings.size()) * static_cast<double>(columns.cols() - 1));
+  const double chance = kJointRules.scatter_chance /
+                        (static_cast<double>(groupings.size()) * static_cast<double>(columns.cols() - 1));
   double factor = 1;
   for (const std::vector<int>& grouping : groupings)
     for (Eigen::Index j = 1; j < columns.cols(); ++j)
@@ -210,7 +208,7 @@ double SessionEvidence::DegreesUnder(const SharedEvidence& evidence) const {
 
 double SessionEvidence::MovesRows(int session, int value) const {
   const Eigen::VectorXd column = fits_[session].columns.values.col(value + 1);
-  const double least = kMovedShare * column.cwiseAbs().maxCoeff();
+  const double least = kJointRules.moved_share * column.cwiseAbs().maxCoeff();
   const auto moved = (column.cwiseAbs().array() > least).count();
   return moved == 0 ? 0 : column.norm() / std::sqrt(static_cast<double>(moved)) / fits_[session].sigma;
 }

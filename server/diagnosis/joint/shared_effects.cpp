@@ -11,12 +11,10 @@
 #include "server/diagnosis/engine/ladder/hypotheses.h"
 #include "server/diagnosis/engine/ladder/ladder.h"
 #include "server/diagnosis/joint/conflicts.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
-
-constexpr double kShownP = 1e-3;  // of a value that one kind alone has by chance
-constexpr double kUnknown = 10;   // usual sizes: a value that is known no better is not known
 
 // What several kinds together may show beside effects that each names by itself, in the order in which it is asked.
 struct JointHypothesis {
@@ -211,7 +209,8 @@ class SharedFinder {
   static bool IsKnown(const model::Effect& effect, const engine::ParameterEstimate& estimate) {
     for (const model::ParameterInfo& parameter : effect.parameters)
       if (parameter.name == estimate.name)
-        return estimate.std_error > 0 && estimate.std_error < kUnknown * parameter.typical;
+        return estimate.std_error > 0 &&
+               estimate.std_error < kJointRules.max_unknown_over_typical * parameter.typical;
     return false;
   }
 
@@ -257,7 +256,7 @@ class SharedFinder {
   static bool ShownBy(int kind, const std::string& name, const JointFit& fit) {
     const engine::Fit& own = fit.fits[kind];
     return engine::NeutralP(own.model, IndexOf(own.model.base(), name), fit.alone[kind], own.covariance) <
-           kShownP;
+           kJointRules.shown_p;
   }
 
   const std::vector<const engine::Modality*>& kinds_;

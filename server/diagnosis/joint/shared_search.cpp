@@ -9,16 +9,13 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/engine/fit/held_out.h"
+#include "server/diagnosis/engine/search/rules.h"
+#include "server/diagnosis/joint/rules.h"
 
 namespace touchstone::diagnosis::joint {
 namespace {
 
-constexpr int kPasses = 2;          // of values and what stands beside them
-constexpr int kMaxTried = 3;        // forms per round, beside those that a kind names by itself
-constexpr double kWorthTrying = 3;  // nats that one kind, or all together, expect of a form
-constexpr double kSwapNats = 0.5;   // that one cause needs in the place of others, with no more values
-constexpr int kMaxShared = 6;       // effects
-constexpr double kWithout = 0.1;    // of the progress: the explanation without any shared effect
+constexpr double kWithout = 0.1;  // of the progress: the explanation without any shared effect
 
 engine::SearchRules Rules() {
   return {};
@@ -32,11 +29,12 @@ struct Form {
 
   double Sum() const { return std::accumulate(gain_nats.begin(), gain_nats.end(), 0.0); }
   int GainingKinds() const {
-    return static_cast<int>(
-        std::count_if(gain_nats.begin(), gain_nats.end(), [](double nats) { return nats >= kWorthTrying; }));
+    return static_cast<int>(std::count_if(gain_nats.begin(), gain_nats.end(),
+                                          [](double nats) { return nats >= kJointRules.worth_trying_nats; }));
   }
   bool IsWorthTrying() const {
-    return named || std::max(*std::max_element(gain_nats.begin(), gain_nats.end()), Sum()) > kWorthTrying;
+    return named || std::max(*std::max_element(gain_nats.begin(), gain_nats.end()), Sum()) >
+                        kJointRules.worth_trying_nats;
   }
 };
 
@@ -93,7 +91,8 @@ absl::StatusOr<std::vector<Form>> ListForms(const Sides& sides, const JointExpla
     return a.named != b.named ? a.named : a.Sum() > b.Sum();
   });
   const auto named = std::count_if(list.begin(), list.end(), [](const Form& form) { return form.named; });
-  if (list.size() > static_cast<size_t>(named + kMaxTried)) list.resize(named + kMaxTried);
+  if (list.size() > static_cast<size_t>(named + kJointRules.max_tried))
+    list.resize(named + kJointRules.max_tried);
   return list;
 }
 
@@ -138,8 +137,9 @@ bool IsWorthIt(const Sides& sides, const JointExplanation& before, const JointEx
   // One cause for several needs no more than to explain as much: the several would each have had to be worth its entry.
   if (replaced > 1) return gain > -Rules().equivalent_nats;
   if (replaced > 0)
-    return gain >
-           (after.fit.parameters.size() > before.fit.parameters.size() ? Rules().swap_nats : kSwapNats);
+    return gain > (after.fit.parameters.size() > before.fit.parameters.size()
+                       ? Rules().swap_nats
+                       : engine::kCandidateRules.swap_equal_nats.value());
   if (gain < (rare ? Rules().enter_rare_nats : Rules().enter_nats)) return false;
   const int added = std::max(
       static_cast<int>(after.fit.parameters.size()) - static_cast<int>(before.fit.parameters.size()), 1);
@@ -154,12 +154,12 @@ using Enter = std::function<absl::Status(double done)>;
 // The shared effects, fitted jointly, with whatever each kind shows beside them.
 absl::StatusOr<JointExplanation> ExplainWith(const Sides& sides, std::vector<SharedEffect> shared,
                                              std::vector<OwnEffects> own, const Enter& enter) {
-  const auto steps = static_cast<double>(1 + kPasses * sides.size());
+  const auto steps = static_cast<double>(1 + kJointRules.passes * sides.size());
   int done = 0;
   TOUCHSTONE_RETURN_IF_ERROR(enter(done++ / steps));
   JointExplanation best{std::move(shared), std::move(own), {}};
   TOUCHSTONE_ASSIGN_OR_RETURN(best.fit, FitJointly(PartsOf(sides, best)));
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kJointRules.passes; ++pass) {
     JointExplanation next = best;
     for (SharedEffect& effect : next.shared) effect = WithValues(effect, best.fit);
     bool same = true;
@@ -209,7 +209,7 @@ absl::StatusOr<SharedSelection> SearchShared(
       selection.none, ExplainWith(sides, {}, own, [&](double done) { return enter("", kWithout * done); }));
   TOUCHSTONE_RETURN_IF_ERROR(enter("", kWithout));
   selection.best = selection.none;
-  for (int round = 0; round < kMaxShared; ++round) {
+  for (int round = 0; round < kJointRules.max_shared; ++round) {
     TOUCHSTONE_ASSIGN_OR_RETURN(std::vector<Form> forms, ListForms(sides, selection.best));
     if (round == 0) TOUCHSTONE_RETURN_IF_ERROR(AddFormsHiddenByOwn(sides, own, &forms));
     int chosen = -1;
