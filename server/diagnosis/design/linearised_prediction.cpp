@@ -5,14 +5,13 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/engine/fit/parameterization.h"
+#include "server/diagnosis/engine/fit/rules.h"
 #include "server/diagnosis/touches/prediction.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
-
-constexpr double kStep = 0.02;                // of a free parameter's scale, for derivatives
-constexpr double kMaxDerivativeSigmas = 200;  // per step; more is a finger that slips off a face
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -34,7 +33,7 @@ absl::StatusOr<std::vector<Matrix>> DerivativesOf(const touches::Observations& o
   const Vector start = free.Start();
   for (int c = 0; c < free.size(); ++c) {
     const engine::FreeParameter& coordinate = free.parameters()[c];
-    double step = kStep * coordinate.scale;
+    double step = engine::kFitRules.derivative_step * coordinate.scale;
     if (start[c] + step > coordinate.upper) step = -step;
     Vector point = start;
     point[c] += step;
@@ -43,7 +42,7 @@ absl::StatusOr<std::vector<Matrix>> DerivativesOf(const touches::Observations& o
     for (int k = 0; k < observations.size(); ++k) {
       const Vector change =
           Centred(moved.time_s, k, fingers, sigma_s) - Centred(at_start_s, k, fingers, sigma_s);
-      if (change.allFinite() && change.cwiseAbs().maxCoeff() < kMaxDerivativeSigmas)
+      if (change.allFinite() && change.cwiseAbs().maxCoeff() < kDesignRules.max_derivative_sigmas)
         columns[k].col(c) = change * (coordinate.scale / step);
     }
   }

@@ -6,21 +6,13 @@
 #include <cmath>
 
 #include "server/base/status.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/engine/fit/parameterization.h"
 #include "server/diagnosis/images/pixels/photo_cells.h"
 #include "server/diagnosis/images/rows/photo_rows.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
-
-constexpr int kCells = 1600;     // of a picture
-constexpr int kMaxPresent = 30;  // photographs that stand for the present data
-constexpr double kRaySteps =
-    1;  // of a value's scale, to both sides: contours must move by more than their grain
-constexpr double kSensorSteps = 0.25;
-constexpr double kTolerance = 1e-4;    // of a direction's squared length, that others leave out
-constexpr double kMinShown = 0.003;    // of the pixels, that show the object
-constexpr double kMinSigmaGrey = 0.3;  // rounding to 8 bits
 
 // One model with everything free that photographs show, and where its simulators stand.
 struct FreeModel {
@@ -50,7 +42,9 @@ FreeModel MakeFreeModel(const model::Model& model, const std::vector<std::string
     double at[2];
     for (const int side : {0, 1}) {
       Eigen::VectorXd point = start;
-      point[c] += (side == 0 ? -1 : 1) * (value.rays ? kRaySteps : kSensorSteps) * parameter.scale;
+      point[c] += (side == 0 ? -1 : 1) *
+                  (value.rays ? kDesignRules.ray_steps.value() : kDesignRules.sensor_steps.value()) *
+                  parameter.scale;
       point = made.free.Clip(point);
       at[side] = point[c];
       value.side[side] =
@@ -74,13 +68,14 @@ class PhotoPredictor {
                  const images::Photographs& present, const images::PixelNoise& noise)
       : present_(present) {
     for (const auto& model : models) models_.push_back(MakeFreeModel(*model, present.objects));
-    shrink_ = std::max(1, (std::max(present.width(), present.height()) + kMaxSidePx - 1) / kMaxSidePx);
+    const int max_side_px = kDesignRules.max_side_px;
+    shrink_ = std::max(1, (std::max(present.width(), present.height()) + max_side_px - 1) / max_side_px);
     images::PixelNoise smaller = noise;
-    smaller.sigma_grey = std::max(noise.sigma_grey, kMinSigmaGrey) / shrink_;
+    smaller.sigma_grey = std::max(noise.sigma_grey, kDesignRules.min_sigma_grey.value()) / shrink_;
     smaller.gain = noise.gain / (shrink_ * shrink_);
     record_ = std::make_unique<images::RecordTable>(smaller);
     grid_ = images::GridOfPicture(std::max(present.width() / shrink_, 1),
-                                  std::max(present.height() / shrink_, 1), kCells);
+                                  std::max(present.height() / shrink_, 1), kDesignRules.cells);
     last_s_ = 0;
     for (const image::PhotoRequest& request : present.requests)
       last_s_ = std::max(last_s_, request.session_time_s);
@@ -147,7 +142,7 @@ class PhotoPredictor {
     for (const ExpectedCells& expected : all)
       for (int c = 0; c < expected.slopes.cols(); ++c)
         spanned.col(next++) = images::Smooth(grid_, expected.slopes.col(c));
-    return images::OrthonormalSpan(spanned, kTolerance);
+    return images::OrthonormalSpan(spanned, kDesignRules.span_tolerance);
   }
 
  private:
@@ -172,7 +167,7 @@ class PhotoPredictor {
         if (x == 0 || y == 0 || x == photo.width - 1 || y == photo.height - 1) return false;
         ++shown;
       }
-    return shown > kMinShown * photo.width * photo.height;
+    return shown > kDesignRules.min_shown_share * photo.width * photo.height;
   }
 
   const images::Photographs& present_;
@@ -191,7 +186,8 @@ absl::StatusOr<std::vector<LinearisedPrediction>> LinearisePhotographs(
   const PhotoPredictor predictor(models, present, noise);
   const size_t count = models.size();
   // What the present data say of the values.
-  const int stride = (present.size() + kMaxPresent - 1) / kMaxPresent;
+  const int max_present = kDesignRules.max_present_photographs;
+  const int stride = (present.size() + max_present - 1) / max_present;
   std::vector<int> kept;
   for (int k = 0; k < present.size(); k += std::max(stride, 1)) kept.push_back(k);
   std::vector<std::vector<Eigen::MatrixXd>> known(kept.size());

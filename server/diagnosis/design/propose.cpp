@@ -5,22 +5,21 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/design/linearised_prediction.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/design/sequential_choice.h"
 #include "server/diagnosis/design/touch_candidates.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
 
-constexpr int kMaxData = 3000;  // touches that stand for the present data
-constexpr int kRunLength = 50;  // in runs, so that a press still reaches the next touch
-
 // The observations, or runs of them spread over the session.
 touches::Observations PresentData(const touches::Observations& observations) {
   std::vector<int> keep;
-  const int runs = (observations.size() + kRunLength - 1) / kRunLength;
-  const int run_step = std::max(1, (observations.size() + kMaxData - 1) / kMaxData);
+  const int run_length = kDesignRules.run_length, max_present = kDesignRules.max_present;
+  const int runs = (observations.size() + run_length - 1) / run_length;
+  const int run_step = std::max(1, (observations.size() + max_present - 1) / max_present);
   for (int run = 0; run < runs; run += run_step)
-    for (int k = run * kRunLength; k < std::min(observations.size(), (run + 1) * kRunLength); ++k)
+    for (int k = run * run_length; k < std::min(observations.size(), (run + 1) * run_length); ++k)
       keep.push_back(k);
   return PartOf(observations, keep);
 }

@@ -25,7 +25,7 @@ struct ProposedTouch {
   // one model what its values leave open about this touch.
   double separation_sigmas = 0;
   // About how many touches like the proposed ones bring the expected log evidence between the two models to
-  // kVerdictNats; 0: one model only, or more than anybody would make.
+  // DesignRules::verdict_nats; 0: one model only, or more than anybody would make.
   int touches_to_verdict = 0;
 };
 

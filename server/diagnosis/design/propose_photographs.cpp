@@ -4,25 +4,18 @@
 
 #include "server/base/status.h"
 #include "server/diagnosis/design/photo_prediction.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/design/sequential_choice.h"
 #include "server/diagnosis/design/view_candidates.h"
 
 namespace touchstone::diagnosis::design {
-namespace {
-
-constexpr int kMaxViews = 180;
-// Squared sigmas in all, below which no picture discriminates: contours are sampled at pixel centres, which alone makes
-// some.
-constexpr double kMinPhotoSeparation = 4;
-
-}  // namespace
 
 absl::StatusOr<std::vector<images::ProposedPhotograph>> ProposePhotographs(
     const images::Photographs& photographs, const images::ExplanationsLeft& left, int max_photographs,
     uint64_t seed, ThreadPool* pool) {
   std::vector<images::ProposedPhotograph> proposed;
   if (left.models.empty() || max_photographs <= 0 || photographs.size() == 0) return proposed;
-  const std::vector<ViewCandidate> views = ListViews(photographs, kMaxViews, seed);
+  const std::vector<ViewCandidate> views = ListViews(photographs, kDesignRules.max_views, seed);
   std::vector<std::shared_ptr<const model::Model>> models;
   std::vector<std::string> names;
   for (const engine::ExplanationsLeft::NamedModel& explanation : left.models) {
@@ -35,7 +28,7 @@ absl::StatusOr<std::vector<images::ProposedPhotograph>> ProposePhotographs(
   for (const ViewCandidate& view : views) objects.push_back(view.object);
   for (const ChosenMeasurement& chosen :
        ChooseMeasurements(names, predictions, objects, static_cast<int>(photographs.objects.size()),
-                          {max_photographs, kMinPhotoSeparation})) {
+                          {max_photographs, kDesignRules.min_photo_separation.value()})) {
     const ViewCandidate& view = views[chosen.candidate];
     proposed.push_back({photographs.objects[view.object], view.camera, chosen.purpose,
                         chosen.separation_sigmas, chosen.to_verdict});
@@ -47,7 +40,7 @@ std::vector<images::ProposedPhotograph> PhotographsToBegin(const images::Photogr
                                                            uint64_t seed) {
   std::vector<images::ProposedPhotograph> proposed;
   for (const ViewCandidate& view :
-       MostDifferentViews(photographs, ListViews(photographs, kMaxViews, seed), count))
+       MostDifferentViews(photographs, ListViews(photographs, kDesignRules.max_views, seed), count))
     proposed.push_back(
         {photographs.objects[view.object], view.camera, "makes the set large enough for a verdict", 0, 0});
   return proposed;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "server/base/units.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/design/touch_candidates.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
@@ -81,7 +82,7 @@ TEST(ProposeTouches, SayHowManyReachAVerdict) {
   for (const ProposedTouch& touch : many) {
     squares += touch.separation_sigmas * touch.separation_sigmas;
     ++reached;
-    if (0.5 * squares >= kVerdictNats) break;
+    if (0.5 * squares >= kDesignRules.verdict_nats) break;
   }
   ASSERT_LT(reached, 12);
   EXPECT_EQ(many[0].touches_to_verdict, reached);

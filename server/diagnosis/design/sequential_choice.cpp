@@ -6,13 +6,10 @@
 #include <cmath>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/design/rules.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
-
-constexpr int kMaxToVerdict = 100000;     // more measurements than that are no advice
-constexpr double kCurvatureShare = 1e-3;  // of the square of a difference, that is no difference
-constexpr double kNegligible = 1e-9;      // weight of the prior: values that no candidate sees stay
 
 // The best model against a competing one: either may be true, and the other is fitted to it.
 struct ModelPair {
@@ -40,9 +37,9 @@ bool Imitates(const LinearisedPrediction& fitted, const LinearisedPrediction& tr
     cross += fitted.derivative[k].transpose() * difference;
     apart += difference.squaredNorm();
   }
-  gram.diagonal().array() += kNegligible;
+  gram.diagonal().array() += kDesignRules.negligible_prior.value();
   const double left = apart - cross.dot(SymmetricSolver(gram).Solve(cross));
-  return 0.5 * left < kVerdictNats || left < kCurvatureShare * apart;
+  return 0.5 * left < kDesignRules.verdict_nats || left < kDesignRules.curvature_share * apart;
 }
 
 // Chooses measurements one after the other, spread over the objects.
@@ -131,9 +128,9 @@ ChosenMeasurement MeasurementChooser::Describe(int k) {
 // Half the squared separation is the expected log evidence. Beyond the chosen ones it grows by as much for each.
 int MeasurementChooser::ToVerdict(const std::vector<double>& nats) const {
   for (size_t n = 0; n < nats.size(); ++n)
-    if (nats[n] >= kVerdictNats) return static_cast<int>(n) + 1;
-  const double needed = std::ceil(kVerdictNats / nats.back() * static_cast<double>(nats.size()));
-  return needed <= kMaxToVerdict ? static_cast<int>(needed) : 0;
+    if (nats[n] >= kDesignRules.verdict_nats) return static_cast<int>(n) + 1;
+  const double needed = std::ceil(kDesignRules.verdict_nats / nats.back() * static_cast<double>(nats.size()));
+  return needed <= kDesignRules.max_to_verdict ? static_cast<int>(needed) : 0;
 }
 
 std::vector<ChosenMeasurement> MeasurementChooser::Choose() {

@@ -21,10 +21,9 @@ struct ChosenMeasurement {
   int candidate = 0;
   std::string purpose;           // "tells tip_radius from oblique_slip", "learns the values of tip_radius"
   double separation_sigmas = 0;  // as ProposedTouch has it
-  int to_verdict = 0;            // measurements like these until kVerdictNats; 0: one model only, or too many
+  int to_verdict =
+      0;  // measurements like these until DesignRules::verdict_nats; 0: one model only, or too many
 };
-
-inline constexpr double kVerdictNats = 6;
 
 // `names` and `predictions`: of the models, best first. `objects[candidate]`: which of `object_count` objects it
 // concerns; measurements are spread over them. Empty if none would discriminate.

@@ -7,15 +7,13 @@
 #include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/design/rules.h"
 #include "server/diagnosis/touches/prediction.h"
 #include "server/touch/plan.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
 
-constexpr double kSpread = 0.8;
-constexpr double kNearEdgeM = 0.001;
-constexpr double kMaxTurnOfNormalRad = 15 * kRadiansPerDegree;  // within kNearEdgeM; more is an edge
 constexpr double kSpeedFactors[] = {1, 0.5, 2};
 
 double Median(std::vector<double> values) {
@@ -58,17 +56,20 @@ void Number(const std::shared_ptr<const session::MeasurementSet>& set, touches::
   observations->time_s.assign(static_cast<size_t>(count) * observations->fingers, 0);
 }
 
-// Whether no finger of touch k meets an edge when the touch moves aside by kNearEdgeM: normal and travel
+// Whether no finger of touch k meets an edge when the touch moves aside by near_edge_m: normal and travel
 // change smoothly.
 bool AwayFromEdges(const touches::Prediction& here, const touches::Prediction& beside, int k) {
   for (int i = 0; i < here.fingers; ++i) {
     const size_t at = size_t(k) * here.fingers + i;
     if (std::isnan(beside.time_s[at])) return false;
-    if (here.normal[at].dot(beside.normal[at]) < std::cos(kMaxTurnOfNormalRad)) return false;
+    if (here.normal[at].dot(beside.normal[at]) <
+        std::cos(kDesignRules.max_turn_of_normal_deg * kRadiansPerDegree))
+      return false;
     // The travel may change by the step times the tangent of the incidence, and a little more.
     const double tangent =
         std::sqrt(std::max(0.0, 1 / std::max(1e-3, std::pow(here.cos_incidence[at], 2)) - 1));
-    if (std::abs(here.travel_m[at] - beside.travel_m[at]) > kNearEdgeM * (1 + 1.5 * tangent)) return false;
+    if (std::abs(here.travel_m[at] - beside.travel_m[at]) > kDesignRules.near_edge_m * (1 + 1.5 * tangent))
+      return false;
   }
   return true;
 }
@@ -90,7 +91,7 @@ std::shared_ptr<const session::MeasurementSet> DrawSet(const touches::Observatio
   touch::Plan plan;
   plan.kind = touch::Plan::Kind::kFaces;
   plan.faces.max_tilt_rad = choice.max_tilt_rad;
-  plan.faces.spread = kSpread;
+  plan.faces.spread = kDesignRules.spread;
   plan.faces.standoff_m = standoff_m;
   plan.faces.rounds = 1;
   plan.faces.samples_per_face = std::clamp(choice.max_candidates / (6 * speeds * objects), 4, 60);
@@ -126,7 +127,8 @@ absl::StatusOr<std::vector<char>> CompletedAwayFromEdges(const touches::Observat
     for (int k = 0; k < moved->size(); ++k) {
       const Eigen::Vector3d side =
           direction < 2 ? moved->lateral[k] : moved->approach[k].cross(moved->lateral[k]).eval();
-      moved->target_m[k] += (direction % 2 ? -kNearEdgeM : kNearEdgeM) * side;
+      moved->target_m[k] +=
+          (direction % 2 ? -kDesignRules.near_edge_m : kDesignRules.near_edge_m.value()) * side;
     }
     touches::Observations beside = Blank(candidates);
     Number(moved, &beside);

@@ -7,18 +7,12 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/units.h"
+#include "server/diagnosis/design/rules.h"
 
 namespace touchstone::diagnosis::design {
 namespace {
 
 constexpr double kDistances[] = {1, 0.7, 1.4, 0.5, 2};  // of the median distance
-constexpr double kHighest = 0.94;                       // sine of the elevation
-constexpr double kLowest = -0.6;
-constexpr double kLowestOverTableRad = 5 * kRadiansPerDegree;
-constexpr double kMargin = 0.03;       // of the picture, around the object
-constexpr double kTowardsRim = 0.8;    // of the free way to the picture's rim
-constexpr double kMinClearance = 1.2;  // of the object's sphere, that the camera stands away from its centre
-constexpr int kMaxTries = 6;           // per view that is wanted
 constexpr double kGoldenTurn = 0.6180339887498949;
 
 struct Axes {
@@ -78,7 +72,7 @@ ViewCandidate DrawView(const images::Photographs& photographs, int object, int n
   const geometry::Bounds& bounds = photographs.surfaces[object]->bounds();
   const session::CameraIntrinsics& lens = photographs.set->camera;
   const Eigen::Vector3d centre = bounds.Centre();
-  const double sine = lowest + (kHighest - lowest) * RadicalInverse(n + 1, 3),
+  const double sine = lowest + (kDesignRules.highest_sine - lowest) * RadicalInverse(n + 1, 3),
                cosine = std::sqrt(1 - sine * sine);
   const double azimuth = 2 * M_PI * (first_turn + kGoldenTurn * n);
   const double distance = distance_m * kDistances[n % std::size(kDistances)];
@@ -97,8 +91,9 @@ ViewCandidate DrawView(const images::Photographs& photographs, int object, int n
   const double radius_m = 0.5 * bounds.DiagonalM();
   const double free_x = 0.5 * lens.width_px / lens.fx_px * distance - radius_m,
                free_y = 0.5 * lens.height_px / lens.fy_px * distance - radius_m;
-  const double along = n % 2 == 0 ? kTowardsRim : -kTowardsRim,
-               down = n / 2 % 2 == 0 ? kTowardsRim : -kTowardsRim;
+  const double towards_rim = kDesignRules.towards_rim;
+  const double along = n % 2 == 0 ? towards_rim : -towards_rim,
+               down = n / 2 % 2 == 0 ? towards_rim : -towards_rim;
   view.camera.at_m += along * std::max(free_x, 0.0) * axes.right + down * std::max(free_y, 0.0) * axes.down;
   return view;
 }
@@ -106,10 +101,12 @@ ViewCandidate DrawView(const images::Photographs& photographs, int object, int n
 bool IsAllowed(const images::Photographs& photographs, const ViewCandidate& view, bool table) {
   const geometry::Bounds& bounds = photographs.surfaces[view.object]->bounds();
   const Eigen::Vector3d from = view.camera.eye_m - bounds.Centre();
-  if (from.norm() < kMinClearance * 0.5 * bounds.DiagonalM()) return false;
+  if (from.norm() < kDesignRules.min_clearance * 0.5 * bounds.DiagonalM()) return false;
   const double height_m = view.camera.eye_m.z() - bounds.min_m.z();
-  if (table && height_m < std::tan(kLowestOverTableRad) * from.head<2>().norm()) return false;
-  return IsInPicture(photographs, view, kMargin);
+  if (table &&
+      height_m < std::tan(kDesignRules.lowest_over_table_deg * kRadiansPerDegree) * from.head<2>().norm())
+    return false;
+  return IsInPicture(photographs, view, kDesignRules.picture_margin);
 }
 
 // How far apart two views of one object are: the angle between them, and the logarithm of their distances' ratio.
@@ -151,8 +148,9 @@ std::vector<ViewCandidate> ListViews(const images::Photographs& photographs, int
   for (int object = 0; object < objects; ++object) {
     const double first_turn = random.Uniform(0, 1);
     int found = 0;
-    for (int n = 0; n < kMaxTries * per_object && found < per_object; ++n) {
-      ViewCandidate view = DrawView(photographs, object, n, distance_m, table ? 0 : kLowest, first_turn);
+    for (int n = 0; n < kDesignRules.max_tries * per_object && found < per_object; ++n) {
+      ViewCandidate view = DrawView(photographs, object, n, distance_m,
+                                    table ? 0 : kDesignRules.lowest_sine.value(), first_turn);
       view.camera = Rounded(view.camera);
       if (!IsAllowed(photographs, view, table)) continue;
       views.push_back(view);
