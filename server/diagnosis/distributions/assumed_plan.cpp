@@ -5,16 +5,11 @@
 #include <map>
 
 #include "server/base/numbers/random.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/diagnosis/distributions/two_samples.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
-
-constexpr int kMaxRepeats = 60;
-constexpr int kMaxForNeighbours = 600;      // touches whose neighbours are looked up
-constexpr double kMaxRepeatDistance = 0.2;  // of repeats, over that of any two touches
-constexpr double kMinGap = 3;               // distance of the nearest other pose over that of the last repeat
-constexpr double kTouchIntervalS = 10;
 
 double Median(std::vector<double> values) {
   if (values.empty()) return NAN;
@@ -51,14 +46,14 @@ double TypicalDistance(const std::vector<double>& time_s, int fingers) {
 // Rounds: a constant number of rows later the same touch comes again. The shortest period counts; 1: none.
 int CountRounds(const std::vector<double>& time_s, int fingers, double typical_s) {
   const int count = static_cast<int>(time_s.size()) / fingers;
-  for (int repeats = std::min(kMaxRepeats, count / 2); repeats >= 2; --repeats) {
+  for (int repeats = std::min(kDistributionRules.max_repeats.value(), count / 2); repeats >= 2; --repeats) {
     if (count % repeats != 0) continue;
     const int period = count / repeats;
     std::vector<double> again;
     const int step = std::max(1, (count - period) / 2000);
     for (int n = 0; n + period < count; n += step)
       PushIfNumber(Distance(time_s, fingers, n, n + period), &again);
-    if (Median(again) < kMaxRepeatDistance * typical_s) return repeats;
+    if (Median(again) < kDistributionRules.max_repeat_distance * typical_s) return repeats;
   }
   return 1;
 }
@@ -66,7 +61,8 @@ int CountRounds(const std::vector<double>& time_s, int fingers, double typical_s
 // Repeats in any order: every touch has repeats - 1 neighbours much closer than the next.
 int CountNeighbours(const std::vector<double>& time_s, int fingers, double typical_s) {
   const int count = static_cast<int>(time_s.size()) / fingers;
-  const int looked_up = std::min(count, kMaxForNeighbours), max_neighbours = std::min(kMaxRepeats, count - 1);
+  const int looked_up = std::min(count, kDistributionRules.max_for_neighbours.value()),
+            max_neighbours = std::min(kDistributionRules.max_repeats.value(), count - 1);
   std::vector<std::vector<double>> nearest(max_neighbours);
   for (int n = 0; n < looked_up; ++n) {
     std::vector<double> distances;
@@ -79,10 +75,11 @@ int CountNeighbours(const std::vector<double>& time_s, int fingers, double typic
   }
   if (nearest[0].empty()) return 1;
   int repeats = 1;
-  double widest = kMinGap;
+  double widest = kDistributionRules.min_gap;
   for (int r = 0; r + 1 < max_neighbours; ++r) {
     const double here = Median(nearest[r]), next = Median(nearest[r + 1]);
-    if (here < kMaxRepeatDistance * typical_s && next > widest * here) repeats = r + 2, widest = next / here;
+    if (here < kDistributionRules.max_repeat_distance * typical_s && next > widest * here)
+      repeats = r + 2, widest = next / here;
   }
   return repeats;
 }
@@ -115,7 +112,7 @@ PoseFreeObject AssumePlan(const session::MeasurementSet& set, int object,
   const int poses = (count + result.repeats - 1) / result.repeats;
   result.plan.kind = touch::Plan::Kind::kFaces;
   result.plan.speed_m_s = speed_m_s;
-  result.plan.touch_interval_s = kTouchIntervalS;
+  result.plan.touch_interval_s = kDistributionRules.touch_interval_s;
   result.plan.faces.samples_per_face = (poses + 5) / 6;
   result.plan.faces.rounds = result.repeats;
 

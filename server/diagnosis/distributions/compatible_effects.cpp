@@ -6,25 +6,16 @@
 #include "server/base/status.h"
 #include "server/base/units.h"
 #include "server/diagnosis/distributions/effect_variation.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
 
-constexpr double kCompatibleP = 0.1;
-constexpr double kClearlyCompatibleP = 0.5;      // no need to look for better values
 constexpr double kStrengths[] = {0.5, 1, 3, 9};  // of the typical value
-constexpr size_t kMaxRefined = 10;               // directions that are refined ...
-constexpr int kMaxRefinedPerEffect = 2;
-constexpr double kTiltStepRad = 6 * kRadiansPerDegree, kMaxTiltRad = 50 * kRadiansPerDegree;
-constexpr double kSpreadStep = 0.1;
-constexpr int kMaxMoves = 3;  // in one direction, per step
 // Step sizes: octaves of the strength, and factors of the steps above. A strength must be right to a few per
-// cent, poses need not: steps below kFineStep leave them alone.
+// cent, poses need not: steps below fine_step leave them alone.
 constexpr double kSteps[] = {1, 0.5, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015};
-constexpr size_t kStepsBeforeRenewal = 2;
-constexpr double kFineStep = 0.2;
-constexpr double kHopelessP = 0.01;  // with a misfit far above the best: not refined further
 // Shares of the progress: screening, one evaluation of all, one step.
 constexpr double kScreeningShare = 0.5, kFirstEvaluationShare = 0.05, kStepShare = 0.04;
 
@@ -71,9 +62,10 @@ Trial Moved(const Trial& trial, size_t what, double step) {
   if (what == 0)
     amount *= std::exp2(step);
   else if (what == 1)
-    tilt_rad = std::clamp(tilt_rad + step * kTiltStepRad, 0.0, kMaxTiltRad);
+    tilt_rad = std::clamp(tilt_rad + step * (kDistributionRules.tilt_step_deg * kRadiansPerDegree), 0.0,
+                          kDistributionRules.max_tilt_deg * kRadiansPerDegree);
   else if (what == 2)
-    moved.poses.spread = std::clamp(moved.poses.spread + step * kSpreadStep, 0.1, 1.0);
+    moved.poses.spread = std::clamp(moved.poses.spread + step * kDistributionRules.spread_step, 0.1, 1.0);
   else
     moved.amounts[(trial.direction.entry + what - 2) % trial.amounts.size()] += 0.5 * step * amount;
   return moved;
@@ -84,18 +76,18 @@ Trial Moved(const Trial& trial, size_t what, double step) {
 // `promising`: poses that suit another effect.
 absl::Status Refine(const model::Model& model, double step, const AssumedPoses& promising,
                     const MisfitOfModel& misfit, Trial* best) {
-  if (best->misfit.p_value > kClearlyCompatibleP) return absl::OkStatus();
+  if (best->misfit.p_value > kDistributionRules.clearly_compatible_p) return absl::OkStatus();
   Trial trial = *best;
   trial.poses = promising;
   TOUCHSTONE_RETURN_IF_ERROR(Attempt(model, trial, ReferenceSize::kFull, misfit, best));
   const model::ParameterInfo& info = trial.direction.effect->parameters[trial.direction.parameter];
   const size_t free = trial.amounts.size() - (info.sum_zero ? 1 : 0);
   for (size_t what = 0; what < 2 + free; ++what) {
-    if (step < kFineStep && (what == 1 || what == 2)) continue;
+    if (step < kDistributionRules.fine_step && (what == 1 || what == 2)) continue;
     bool moved = false;
     for (const double sign : {-1.0, 1.0}) {
-      for (int n = 0; n < kMaxMoves && !(moved && n == 0); ++n) {
-        if (best->misfit.p_value > kClearlyCompatibleP) return absl::OkStatus();
+      for (int n = 0; n < kDistributionRules.max_moves && !(moved && n == 0); ++n) {
+        if (best->misfit.p_value > kDistributionRules.clearly_compatible_p) return absl::OkStatus();
         const double before = best->misfit.distance;
         TOUCHSTONE_RETURN_IF_ERROR(
             Attempt(model, Moved(*best, what, sign * step), ReferenceSize::kFull, misfit, best));
@@ -165,11 +157,11 @@ absl::Status CompatibleEffectSearch::ScreenAll(const std::vector<EffectDirection
   std::stable_sort(screened.begin(), screened.end(),
                    [](const Trial& a, const Trial& b) { return a.misfit.distance < b.misfit.distance; });
   for (const Trial& trial : screened) {
-    if (trials_.size() == kMaxRefined || trial.misfit.distance == HUGE_VAL) break;
+    if (trials_.size() == kDistributionRules.max_refined || trial.misfit.distance == HUGE_VAL) break;
     const auto of_effect = std::count_if(trials_.begin(), trials_.end(), [&](const Trial& other) {
       return other.direction.effect == trial.direction.effect;
     });
-    if (of_effect < kMaxRefinedPerEffect) trials_.push_back(trial);
+    if (of_effect < kDistributionRules.max_refined_per_effect) trials_.push_back(trial);
   }
   return absl::OkStatus();
 }
@@ -192,7 +184,7 @@ void CompatibleEffectSearch::DropHopeless() {
   const double smallest = Leader().misfit.distance;
   trials_.erase(std::remove_if(trials_.begin(), trials_.end(),
                                [&](const Trial& trial) {
-                                 return trial.misfit.p_value < kHopelessP &&
+                                 return trial.misfit.p_value < kDistributionRules.hopeless_p &&
                                         trial.misfit.distance > 2 * smallest + 2;
                                }),
                 trials_.end());
@@ -202,7 +194,7 @@ absl::Status CompatibleEffectSearch::RefineAll(const RenewMisfit& renew) {
   if (trials_.empty()) return absl::OkStatus();
   TOUCHSTONE_RETURN_IF_ERROR(Evaluate(kFirstEvaluationShare));
   for (size_t s = 0; s < std::size(kSteps); ++s) {
-    if (s == kStepsBeforeRenewal) {
+    if (s == kDistributionRules.steps_before_renewal) {
       const Trial best = Leader();
       TOUCHSTONE_ASSIGN_OR_RETURN(misfit_, renew(Varied(model_, best.direction, best.amounts), best.poses));
       TOUCHSTONE_RETURN_IF_ERROR(Evaluate(kStepShare));
@@ -222,7 +214,7 @@ std::vector<CompatibleEffect> CompatibleEffectSearch::Compatible() {
   std::vector<CompatibleEffect> compatible;
   for (const Trial& trial : trials_) {
     const std::string& name = trial.direction.effect->name;
-    if (trial.misfit.p_value > kCompatibleP &&
+    if (trial.misfit.p_value > kDistributionRules.compatible_p &&
         std::none_of(compatible.begin(), compatible.end(),
                      [&](const CompatibleEffect& effect) { return effect.effect == name; }))
       compatible.push_back(

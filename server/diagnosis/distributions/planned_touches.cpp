@@ -4,13 +4,12 @@
 #include <map>
 
 #include "server/base/status.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/touch/batch_row.h"
 #include "server/touch/simulate.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
-
-constexpr uint32_t kMaxAttempts = 64;
 
 void Fill(const std::vector<touch::CommandedTouch>& touches, const std::vector<uint64_t>& numbers, size_t k,
           int t, effects::TouchBatch* batch) {
@@ -44,7 +43,7 @@ absl::StatusOr<PlannedTouches> DrawPlannedTouches(std::shared_ptr<const model::M
   touch::TouchWorkspace workspace;
   batch.surface = surface;
   batch.seed = seed;
-  for (uint32_t n = 0; n < kMaxAttempts && !slots.empty(); ++n) {
+  for (uint32_t n = 0; n < kDistributionRules.max_attempts && !slots.empty(); ++n) {
     simulator.Prepare(static_cast<int>(slots.size()), &batch);
     for (size_t t = 0; t < slots.size(); ++t)
       Fill(drawn.touches, numbers, slots[t], static_cast<int>(t), &batch);

@@ -7,13 +7,11 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/distributions/rules.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
 
-constexpr double kSuspicious = 0.1;  // below it the poses are fitted
-constexpr double kSmallP = 0.005;    // below it the model is not compatible
-const AssumedPoses kWidePoses{32 * kRadiansPerDegree, 0.62};
 // Shares of the work that are done before each part of it.
 constexpr double kBeforeFit = 0.1, kBeforeRank = 0.2, kBeforeEffects = 0.5, kBeforeRenewal = 0.8145;
 
@@ -37,7 +35,9 @@ absl::StatusOr<std::vector<CompatibleEffect>> CompatibleEffects(const PoseFreeEx
     return misfit_under(own.Null(experiment.objects.size()));
   };
   // Poses that were fitted to a model that lacks an effect may be far from the right ones.
-  const std::vector<AssumedPoses> poses = {AssumedPoses(), kWidePoses, rank.poses()};
+  const AssumedPoses wide{kDistributionRules.wide_tilt_deg * kRadiansPerDegree,
+                          kDistributionRules.wide_spread.value()};
+  const std::vector<AssumedPoses> poses = {AssumedPoses(), wide, rank.poses()};
   return FindCompatibleEffects(
       *experiment.model, experiment.noise_is_known(), experiment.input.also, poses,
       misfit_under(rank.Null(experiment.objects.size())), renew, experiment.context.pool, [&](double done) {
@@ -65,7 +65,7 @@ PoseFreeComparison Prepare(const PoseFreeExperiment& experiment) {
 void DescribeTest(const PoseFreeExperiment& experiment, const PoseFreeRank& rank, bool poses_fitted,
                   PoseFreeComparison* comparison) {
   comparison->p_value = rank.p();
-  comparison->compatible = rank.p() > kSmallP;
+  comparison->compatible = rank.p() > kDistributionRules.small_p;
   comparison->energy_distance_s = rank.distances()[0];
   comparison->energy_p_value = rank.Null(experiment.objects.size()).P(0, rank.distances()[0]);
   comparison->statistics = CompareStatistics(experiment, rank);
@@ -88,7 +88,7 @@ absl::StatusOr<PoseFreeComparison> ComparePoseFree(const DiagnosisInput& input,
 
   TOUCHSTONE_ASSIGN_OR_RETURN(PoseFreeRank rank, PoseFreeRank::Make(experiment, experiment.model,
                                                                     AssumedPoses(), true, 0, kBeforeFit));
-  const bool fitted = rank.p() <= kSuspicious;
+  const bool fitted = rank.p() <= kDistributionRules.suspicious_p;
   if (fitted) {
     TOUCHSTONE_ASSIGN_OR_RETURN(const AssumedPoses poses,
                                 FitPoses(experiment, rank, kBeforeFit, kBeforeRank));

@@ -7,11 +7,10 @@
 
 #include "server/base/numbers/normal.h"
 #include "server/base/units.h"
+#include "server/diagnosis/distributions/rules.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
-
-constexpr size_t kMaxExamples = 5;
 
 // Contact times relative to the first finger's, in us: the contrasts of a sample's points undone (Helmert's
 // rows are orthonormal).
@@ -99,7 +98,8 @@ PoseFreeRows CountRows(const PoseFreeExperiment& experiment) {
       rows.compared += missing == 0;
       if (missing == 0) continue;
       ++rows.incomplete;
-      if (rows.incomplete_examples.size() < kMaxExamples) rows.incomplete_examples.push_back(set.touch[row]);
+      if (rows.incomplete_examples.size() < kDistributionRules.max_examples)
+        rows.incomplete_examples.push_back(set.touch[row]);
     }
   }
   return rows;

@@ -8,16 +8,12 @@
 #include "server/base/numbers/random.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
 
-constexpr int kMaxMeasuredTouches = 1500;  // all objects together
-// About, all objects together; the cost of distances within one object grows with the square of its touches.
-constexpr int kReferenceTouches = 1200, kMaxReferencePerObject = 600;
-constexpr int kQuickTouches = 480, kMaxQuickPerObject = 360;
-constexpr double kMinNoiseChange = 3;   // standard errors, for the model's noise to be replaced
 constexpr uint64_t kReferenceSeed = 1;  // sets are 2, 3, ...
 
 }  // namespace
@@ -47,8 +43,8 @@ absl::Status PoseFreeExperiment::Prepare() {
   const int count = static_cast<int>(set.objects.size());
   for (int o = 0; o < count; ++o) {
     const auto surface = input.surfaces.find(set.objects[o]);
-    objects.push_back(
-        AssumePlan(set, o, surface->second, speed_m_s, std::max(24, kMaxMeasuredTouches / count)));
+    objects.push_back(AssumePlan(set, o, surface->second, speed_m_s,
+                                 std::max(24, kDistributionRules.max_measured_touches / count)));
   }
   TOUCHSTONE_RETURN_IF_ERROR(CompareSizes());
   if (size_ratio == 1) EstimateNoise();
@@ -82,7 +78,7 @@ void PoseFreeExperiment::EstimateNoise() {
     if (instance.effect->role != model::EffectRole::kNoiseLevel) continue;
     const double sigma_s = instance.ValuesFor(set.objects[0])[0];
     const double std_error_s = scatter.sigma_s / std::sqrt(2 * scatter.degrees_of_freedom);
-    if (std::abs(scatter.sigma_s - sigma_s) < kMinNoiseChange * std_error_s) return;
+    if (std::abs(scatter.sigma_s - sigma_s) < kDistributionRules.min_noise_change * std_error_s) return;
     instance.values[0] = scatter.sigma_s;
     instance.object_values.clear();
     noise_changed = true;
@@ -124,8 +120,10 @@ absl::StatusOr<std::shared_ptr<const PlannedTouches>> PoseFreeExperiment::Touche
     if (found != touches_.end()) return found->second;
   }
   const bool quick = size == ReferenceSize::kQuick;
-  const int max_touches = quick ? kMaxQuickPerObject : kMaxReferencePerObject,
-            all_touches = quick ? kQuickTouches : kReferenceTouches;
+  const int max_touches = quick ? kDistributionRules.max_quick_per_object.value()
+                                : kDistributionRules.max_reference_per_object.value(),
+            all_touches = quick ? kDistributionRules.quick_touches.value()
+                                : kDistributionRules.reference_touches.value();
   touch::Plan plan = WithPoses(objects[object].plan, poses);
   plan.faces.rounds = 1;
   plan.faces.samples_per_face =

@@ -11,6 +11,7 @@
 #include "server/diagnosis/distributions/assumed_plan.h"
 #include "server/diagnosis/distributions/planned_touches.h"
 #include "server/diagnosis/distributions/pose_free_distances.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/diagnosis/input.h"
 
 namespace touchstone::diagnosis::distributions {
@@ -41,7 +42,9 @@ class PoseFreeExperiment {
     return !context.progress || context.progress(stage, done);
   }
   // Whether the rounds are enough to know the noise.
-  bool noise_is_known() const { return scatter.degrees_of_freedom >= kMinDegreesOfFreedom; }
+  bool noise_is_known() const {
+    return scatter.degrees_of_freedom >= kDistributionRules.min_degrees_of_freedom;
+  }
 
   const DiagnosisInput& input;
   const DiagnosisContext& context;
@@ -56,9 +59,6 @@ class PoseFreeExperiment {
   PoseFreeSamples measured;
 
  private:
-  // Fewer degrees of freedom leave the noise unknown.
-  static constexpr double kMinDegreesOfFreedom = 20;
-
   PoseFreeExperiment(const DiagnosisInput& i, const DiagnosisContext& c)
       : input(i), context(c), set(*i.set), model(i.model) {}
   absl::Status Prepare();

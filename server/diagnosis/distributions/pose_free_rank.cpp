@@ -5,16 +5,12 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/distributions/rules.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
 
-constexpr int kEnough = 10;     // sets at least as far off: no more are needed to know that p is not small
-constexpr int kPortion = 8;     // sets between two reports of progress
-constexpr int kFirstSets = 39;  // until p is roughly known
-constexpr int kSomeSets = 99;
-constexpr int kSmallPSets = 219;  // the fewest that can show p < 0.005
-constexpr int kAllSets = 499;
+constexpr int kPortion = 8;  // sets between two reports of progress
 
 }  // namespace
 
@@ -43,7 +39,9 @@ absl::StatusOr<PoseFreeRank> PoseFreeRank::Make(const PoseFreeExperiment& experi
   rank.distances_ = PoseFreeDistances(experiment.measured, rank.reference_);
 
   const size_t objects = experiment.objects.size();
-  const int max_sets = coarse ? kSomeSets : kAllSets;
+  const int first_sets = kDistributionRules.first_sets, some_sets = kDistributionRules.some_sets,
+            small_p_sets = kDistributionRules.small_p_sets, all_sets = kDistributionRules.all_sets;
+  const int max_sets = coarse ? some_sets : all_sets;
   std::vector<absl::Status> status(max_sets);
   const auto make = [&](int begin, int end) {
     for (int n = begin; n < end; ++n) {
@@ -57,7 +55,7 @@ absl::StatusOr<PoseFreeRank> PoseFreeRank::Make(const PoseFreeExperiment& experi
       rank.sets_[n].push_back(PoseFreeDistances(*set, rank.reference_));
     }
   };
-  for (const int until : {kFirstSets, kSomeSets, kSmallPSets, kAllSets}) {
+  for (const int until : {first_sets, some_sets, small_p_sets, all_sets}) {
     if (until > max_sets) break;
     for (int begin = static_cast<int>(rank.sets_.size()); begin < until; begin += kPortion) {
       if (!experiment.Progress("simulating sets", from + (to - from) * begin / max_sets))
@@ -77,10 +75,10 @@ absl::StatusOr<PoseFreeRank> PoseFreeRank::Make(const PoseFreeExperiment& experi
     const double measured = null.LargestStandardised(rank.distances_);
     const auto as_large = std::count_if(simulated.begin(), simulated.end(),
                                         [&](double value) { return value >= measured - 1e-12; });
-    rank.p_ = SequentialP(simulated, measured, kEnough);
-    if (as_large >= kEnough) break;
-    if (coarse && rank.p_ <= 0.1) break;
-    if (until == kSmallPSets && as_large == 0) break;
+    rank.p_ = SequentialP(simulated, measured, kDistributionRules.enough_sets);
+    if (as_large >= kDistributionRules.enough_sets) break;
+    if (coarse && rank.p_ <= kDistributionRules.suspicious_p) break;
+    if (until == small_p_sets && as_large == 0) break;
   }
   return rank;
 }

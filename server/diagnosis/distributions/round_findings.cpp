@@ -9,19 +9,13 @@
 
 #include "server/base/numbers/random.h"
 #include "server/base/text/readable_time.h"
+#include "server/diagnosis/distributions/rules.h"
 #include "server/diagnosis/residuals/distribution/permutation.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::distributions {
 namespace {
 
-constexpr double kFindingP = 1e-4;
-constexpr int kMinRepeated = 60;  // touches that have repeats, below which nothing is said
-constexpr int kOrderPermutations = 400, kGaussianSets = 200;
-constexpr double kMinEffective = 30;  // independent terms of a sum that is called normal
-constexpr double kMaxPress = 6;       // deviations of the previous press beyond so many median ones are cut
-constexpr int kTickTimes = 400;
-constexpr double kMinTickS = 1e-3, kTickCoherence = 0.9;
 constexpr int kTests = 4;  // kinds of findings: what every p is paid for
 
 // A touch less its mean over the fingers and less the mean of its pose, s.
@@ -69,7 +63,7 @@ void ClipPresses(RepeatedTouches* data) {
     for (const double press_s : touch.press_s) sizes.push_back(std::abs(press_s));
   if (sizes.empty()) return;
   std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  const double limit_s = kMaxPress * sizes[sizes.size() / 2];
+  const double limit_s = kDistributionRules.max_press * sizes[sizes.size() / 2];
   for (RepeatedTouch& touch : data->touches)
     for (double& press_s : touch.press_s) press_s = std::clamp(press_s, -limit_s, limit_s);
 }
@@ -180,7 +174,7 @@ OrderTests TestOrder(const RepeatedTouches& data, uint64_t seed) {
   std::vector<double> blocks, neighbours, press;
   std::vector<std::vector<double>> trend(data.fingers);
   RandomStream random(seed, RandomDomain::kDiagnosis, 0, 8);
-  for (int n = 0; n < kOrderPermutations; ++n) {
+  for (int n = 0; n < kDistributionRules.order_permutations; ++n) {
     for (const std::vector<int>& members : data.of_pose)
       for (size_t u = members.size() - 1; u > 0; --u)
         std::swap(source[members[u]], source[members[random.Below(u + 1)]]);
@@ -200,7 +194,7 @@ OrderTests TestOrder(const RepeatedTouches& data, uint64_t seed) {
   for (const RepeatedTouch& touch : data.touches)
     for (const double c : touch.press_s) squares += c * c, fourth += c * c * c * c;
   tests.press_z = ZScore(observed.press, press);
-  if (fourth > 0 && squares * squares / fourth >= kMinEffective)
+  if (fourth > 0 && squares * squares / fourth >= kDistributionRules.min_effective)
     tests.press_p = std::min(1.0, 2 * NormalTail(std::abs(tests.press_z)));
   return tests;
 }
@@ -218,7 +212,7 @@ double TailsP(const RepeatedTouches& data, uint64_t seed) {
   std::vector<double> gaussian;
   RepeatedTouches noise = data;
   RandomStream random(seed, RandomDomain::kDiagnosis, 1, 8);
-  for (int n = 0; n < kGaussianSets; ++n) {
+  for (int n = 0; n < kDistributionRules.gaussian_sets; ++n) {
     for (RepeatedTouch& touch : noise.touches) {
       double mean = 0;
       for (double& r : touch.residual_s) mean += (r = random.Normal()) / data.fingers;
@@ -248,7 +242,7 @@ std::vector<std::string> EffectsThat(const Predicate& does) {
 void AddOrder(const RepeatedTouches& data, uint64_t seed, std::vector<RoundFinding>* findings) {
   const OrderTests tests = TestOrder(data, seed);
   const double session_p = std::min(1.0, kTests * tests.session_p);
-  if (session_p < kFindingP)
+  if (session_p < kDistributionRules.finding_p)
     findings->push_back(
         {RoundFindingKind::kSession, session_p,
          "Repeats of the same touches change with their place in the session: a drift, an offset "
@@ -259,7 +253,7 @@ void AddOrder(const RepeatedTouches& data, uint64_t seed, std::vector<RoundFindi
                   effect.role == model::EffectRole::kNoiseMemory;
          })});
   const double press_p = std::min(1.0, kTests * tests.press_p);
-  if (press_p < kFindingP)
+  if (press_p < kDistributionRules.finding_p)
     findings->push_back(
         {RoundFindingKind::kPreviousPress, press_p,
          absl::StrCat("A finger that was pressed harder in the previous touch comes ",
@@ -282,7 +276,7 @@ std::vector<double> TimesSinceFirst(const session::MeasurementSet& set) {
       if (set.TimeS(row, i) > first) all.push_back(set.TimeS(row, i) - first);
   }
   std::vector<double> chosen;
-  const size_t wanted = std::min<size_t>(kTickTimes, all.size());
+  const size_t wanted = std::min<size_t>(kDistributionRules.tick_times.value(), all.size());
   for (size_t n = 0; n < wanted; ++n) chosen.push_back(all[n * all.size() / wanted]);
   return chosen;
 }
@@ -298,14 +292,14 @@ double Coherence(const std::vector<double>& time_s, double frequency_hz) {
 }  // namespace
 
 double CommonTick(const std::vector<double>& time_s) {
-  if (time_s.size() < kMinRepeated) return 0;
+  if (static_cast<int>(time_s.size()) < kDistributionRules.min_repeated) return 0;
   std::vector<double> sorted = time_s;
   std::sort(sorted.begin(), sorted.end());
   const double median = sorted[sorted.size() / 2], range = sorted[sorted.size() * 95 / 100];
-  if (!(median > 4 * kMinTickS)) return 0;
+  if (!(median > 4 * kDistributionRules.min_tick_s)) return 0;
   // The lowest frequency is the tick; its multiples fit as well.
   const double step_hz = 0.1 / range;
-  for (double f = 4 / median; f <= 1 / kMinTickS; f += step_hz) {
+  for (double f = 4 / median; f <= 1 / kDistributionRules.min_tick_s; f += step_hz) {
     if (Coherence(time_s, f) < 0.5) continue;
     double best = f, fit = 0;
     // The peak is ten steps wide; its top lies within.
@@ -313,7 +307,7 @@ double CommonTick(const std::vector<double>& time_s) {
       const double nearby = f + n * step_hz / 20;
       if (const double c = Coherence(time_s, nearby); c > fit) best = nearby, fit = c;
     }
-    if (fit > kTickCoherence) return 1 / best;
+    if (fit > kDistributionRules.tick_coherence) return 1 / best;
   }
   return 0;
 }
@@ -322,10 +316,11 @@ std::vector<RoundFinding> FindInRounds(const PoseFreeExperiment& experiment) {
   std::vector<RoundFinding> findings;
   const model::Model& given = *experiment.input.model;
   const RepeatedTouches data = CollectRepeats(experiment);
-  if (static_cast<int>(data.touches.size()) >= kMinRepeated) {
+  if (static_cast<int>(data.touches.size()) >= kDistributionRules.min_repeated) {
     AddOrder(data, experiment.input.seed, &findings);
     const double p = std::min(1.0, kTests * TailsP(data, experiment.input.seed));
-    if (p < kFindingP && !HasRole(given, {model::EffectRole::kNoiseTails, model::EffectRole::kNoiseGrowth}))
+    if (p < kDistributionRules.finding_p &&
+        !HasRole(given, {model::EffectRole::kNoiseTails, model::EffectRole::kNoiseGrowth}))
       findings.push_back(
           {RoundFindingKind::kTails, p,
            "Repeats of the same touches scatter with tails: noise that is larger in some poses, now and then "
@@ -339,7 +334,7 @@ std::vector<RoundFinding> FindInRounds(const PoseFreeExperiment& experiment) {
   const double tick_s = CommonTick(times);
   if (tick_s > 0 && !HasRole(given, {model::EffectRole::kQuantisation})) {
     const double fit = Coherence(times, 1 / tick_s);
-    const double tried = 10 * times.size() / kMinTickS * tick_s;
+    const double tried = 10 * times.size() / kDistributionRules.min_tick_s * tick_s;
     findings.push_back(
         {RoundFindingKind::kTicks,
          std::min(1.0, kTests * tried * std::exp(-fit * fit * static_cast<double>(times.size()))),
