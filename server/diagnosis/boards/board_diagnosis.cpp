@@ -14,15 +14,13 @@
 #include "server/base/text/text.h"
 #include "server/base/text/value_text.h"
 #include "server/diagnosis/boards/board_search.h"
+#include "server/diagnosis/boards/rules.h"
 #include "server/diagnosis/engine/fit/fitted_values.h"
 #include "server/diagnosis/engine/fit/resampled_covariance.h"
 #include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
-
-constexpr double kCopyPx =
-    1e-3;  // corners of two pictures that were taken scatter by a hundredth of a pixel or more
 
 // What corners may show beside effects of the catalogue.
 struct BoardHypothesis {
@@ -67,7 +65,7 @@ BoardSet WithoutCopies(const BoardSet& set, std::vector<std::string>* copies) {
           for (size_t corner = 0; corner < picture.corners_px.size(); ++corner)
             farthest_px =
                 std::max(farthest_px, (picture.corners_px[corner] - other.corners_px[corner]).norm());
-          return farthest_px < kCopyPx;
+          return farthest_px < kBoardRules.copy_px;
         });
     if (copied)
       copies->push_back(picture.file);
@@ -77,14 +75,14 @@ BoardSet WithoutCopies(const BoardSet& set, std::vector<std::string>* copies) {
   return distinct;
 }
 
-// How many orientations of the board lie kMinTiltApartDeg apart, each picture's against all that count so far.
+// How many orientations of the board lie BoardRules::min_tilt_apart_deg apart, each picture's against all that count so far.
 absl::StatusOr<int> OrientationsOf(const BoardSet& set, const image::PhotoLens& lens) {
   TOUCHSTONE_ASSIGN_OR_RETURN(const std::vector<BoardPose> poses, StartPoses(set, lens));
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : poses) {
     const Eigen::Vector3d normal = pose.rotation.col(2);
     if (std::all_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& other) {
-          return normal.dot(other) < std::cos(kMinTiltApartDeg * M_PI / 180);
+          return normal.dot(other) < std::cos(kBoardRules.min_tilt_apart_deg * M_PI / 180);
         }))
       normals.push_back(normal);
   }
@@ -123,7 +121,8 @@ std::string Summary(const BoardSet& set, const BoardDiagnosis& diagnosis) {
         "deg, to "
         "the left and right and up and down.",
         diagnosis.pictures, diagnosis.orientations,
-        diagnosis.orientations == 1 ? "orientation" : "orientations", kMinOrientations, kMinTiltApartDeg);
+        diagnosis.orientations == 1 ? "orientation" : "orientations", kBoardRules.min_orientations.value(),
+        kBoardRules.min_tilt_apart_deg.value());
   if (diagnosis.verdict == engine::Verdict::kTooLittleData)
     return absl::StrFormat(
         "The board was found in %d pictures; %d are needed, from different sides.%s", diagnosis.pictures,
@@ -232,16 +231,16 @@ absl::StatusOr<BoardDiagnosis> DiagnoseBoards(const BoardSet& all, const model::
     diagnosis.warnings.push_back(absl::StrCat("no whole board of ", set.board.columns, "x", set.board.rows,
                                               " inner corners was found in ",
                                               absl::StrJoin(set.without_board, ", ")));
-  if (diagnosis.pictures < kMinBoardPictures) {
+  if (diagnosis.pictures < kBoardRules.min_pictures) {
     diagnosis.verdict = engine::Verdict::kTooLittleData;
-    diagnosis.pictures_needed = kMinBoardPictures;
+    diagnosis.pictures_needed = kBoardRules.min_pictures;
     diagnosis.summary = Summary(set, diagnosis);
     return diagnosis;
   }
   TOUCHSTONE_ASSIGN_OR_RETURN(diagnosis.orientations, OrientationsOf(set, LensOfModel(set.camera, model)));
-  if (diagnosis.orientations < kMinOrientations) {
+  if (diagnosis.orientations < kBoardRules.min_orientations) {
     diagnosis.verdict = engine::Verdict::kTooLittleData;
-    diagnosis.pictures_needed = diagnosis.pictures + kMinOrientations - diagnosis.orientations;
+    diagnosis.pictures_needed = diagnosis.pictures + kBoardRules.min_orientations - diagnosis.orientations;
     diagnosis.summary = Summary(set, diagnosis);
     return diagnosis;
   }

@@ -3,7 +3,7 @@
 // Observations are the corners, px; every picture's pose of the board is a nuisance that is always fitted. Explanations are
 // the catalogue's effects of the projection (focal_error, principal_point, radial_distortion) and, to keep those honest, what
 // a lens may do besides, which has no effect: it can only be named as a rest. An effect is claimed where the corners are
-// kMinGainNats more probable with it (the engine's evidence, sigma unknown) and pictures that the fit did not see are predicted
+// BoardRules::min_gain_nats more probable with it (the engine's evidence, sigma unknown) and pictures that the fit did not see are predicted
 // better: the lens is fitted without the picture, its pose to one half of its corners (like the colours of a chessboard), the
 // error is that of the other half, and the other way round.
 #pragma once
@@ -21,13 +21,6 @@
 #include "server/uncertainty/budget.h"
 
 namespace touchstone::diagnosis::boards {
-
-inline constexpr int kMinBoardPictures = 5;
-inline constexpr double kMinGainNats = 3;
-// Orientations of the board before the camera, this far apart, that a lens takes: each gives two conditions on fx, fy, cx and
-// cy (Zhang 2000); turned in its own plane or shifted the board gives none.
-inline constexpr int kMinOrientations = 3;
-inline constexpr double kMinTiltApartDeg = 5;
 
 // Errors (engine::Quality) are reprojection errors: sqrt(sum ||measured - predicted||^2 / corners), px, as
 // cv::calibrateCamera gives it; lens and poses fitted to all corners, or, held out, of left-out pictures. The lack of fit is
@@ -57,7 +50,7 @@ struct BoardDiagnosis : engine::Improvement {
   engine::NoiseFloor noise;
   std::vector<BoardRest> rest;
   int pictures_needed = 0;          // with kTooLittleData
-  int orientations = 0;             // of the board, kMinTiltApartDeg apart; 0: not looked at
+  int orientations = 0;             // of the board, BoardRules::min_tilt_apart_deg apart; 0: not looked at
   std::vector<std::string> copies;  // files whose corners are another's to the last digits: counted once
   std::optional<BoardLens> lens;    // none with kTooLittleData
   // Of a corner that the lens predicts, the picture's pose fitted to its corners; of all pictures, px. None with kTooLittleData.

@@ -13,6 +13,7 @@
 
 #include "server/base/status.h"
 #include "server/base/text/text.h"
+#include "server/diagnosis/boards/rules.h"
 #include "server/image/encoding/whole_picture.h"
 #include "server/session/images/camera_yaml.h"
 #include "server/session/images/image_set_file.h"
@@ -21,13 +22,6 @@ namespace touchstone::diagnosis::boards {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr size_t kMaxPictures = 1000;
-constexpr int kMaxSide = 16384;
-// Half a side of the window in which a corner is refined: no more than this share of the way to the next corner, where
-// another edge would draw it away.
-constexpr double kWindowShare = 0.35;
-constexpr int kMinWindow = 3, kMaxWindow = 11;
 
 absl::StatusOr<std::vector<fs::path>> PicturesOf(const std::string& folder) {
   std::vector<fs::path> files;
@@ -40,9 +34,9 @@ absl::StatusOr<std::vector<fs::path>> PicturesOf(const std::string& folder) {
     return absl::NotFoundError(
         absl::StrCat(folder, ": ", error.message(), "; a folder of pictures was expected"));
   if (files.empty()) return absl::NotFoundError(absl::StrCat(folder, ": holds no picture (.png, .jpg)"));
-  if (files.size() > kMaxPictures)
-    return absl::InvalidArgumentError(
-        absl::StrCat(folder, ": holds ", files.size(), " pictures; must be at most ", kMaxPictures));
+  if (files.size() > kBoardRules.max_pictures)
+    return absl::InvalidArgumentError(absl::StrCat(
+        folder, ": holds ", files.size(), " pictures; must be at most ", kBoardRules.max_pictures.value()));
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -65,8 +59,8 @@ std::optional<BoardPicture> FindCorners(const cv::Mat& grey, const BoardLayout& 
   if (!cv::findChessboardCorners(grey, cv::Size(board.columns, board.rows), corners) ||
       static_cast<int>(corners.size()) != board.corners())
     return std::nullopt;
-  const int window =
-      std::clamp(static_cast<int>(kWindowShare * SmallestStep(corners, board)), kMinWindow, kMaxWindow);
+  const int window = std::clamp(static_cast<int>(kBoardRules.window_share * SmallestStep(corners, board)),
+                                kBoardRules.min_window_px.value(), kBoardRules.max_window_px.value());
   cv::cornerSubPix(grey, corners, cv::Size(window, window), cv::Size(-1, -1),
                    cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 1e-3));
   BoardPicture picture;
@@ -106,9 +100,10 @@ absl::StatusOr<BoardSet> ReadBoardPictures(const std::string& folder, const Boar
     try {
       const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
       const cv::Mat grey = cv::imdecode(coded, cv::IMREAD_GRAYSCALE);
-      if (grey.empty() || std::max(grey.cols, grey.rows) > kMaxSide)
-        return absl::InvalidArgumentError(
-            absl::StrCat(file.string(), ": cannot be read as a picture of at most ", kMaxSide, " px a side"));
+      if (grey.empty() || std::max(grey.cols, grey.rows) > kBoardRules.max_side_px)
+        return absl::InvalidArgumentError(absl::StrCat(file.string(),
+                                                       ": cannot be read as a picture of at most ",
+                                                       kBoardRules.max_side_px.value(), " px a side"));
       if (set.camera.width_px == 0) set.camera = GuessedCamera(grey.cols, grey.rows);
       if (grey.cols != set.camera.width_px || grey.rows != set.camera.height_px)
         return absl::InvalidArgumentError(absl::StrCat(

@@ -7,13 +7,10 @@
 #include <Eigen/Geometry>
 
 #include "server/base/numbers/decompositions.h"
+#include "server/diagnosis/boards/rules.h"
 
 namespace touchstone::diagnosis::boards {
 namespace {
-
-constexpr int kMaxIterations = 200;
-constexpr double kConverged = 1e-9;  // relative fall of the sum of squares by the last step
-constexpr double kMaxDamping = 1e12;
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -132,7 +129,8 @@ BoardPose FitPose(const BoardSet& set, const image::PhotoLens& lens, int picture
   BoardPose pose = std::move(start);
   PoseEquations here = EquationsAt(set, lens, pose, picture, half);
   double damping = 1e-4;
-  for (int iteration = 0; iteration < kMaxIterations && std::isfinite(here.squares); ++iteration) {
+  for (int iteration = 0; iteration < kBoardRules.max_iterations && std::isfinite(here.squares);
+       ++iteration) {
     BoardPose next;
     PoseEquations there;
     do {
@@ -141,9 +139,9 @@ BoardPose FitPose(const BoardSet& set, const image::PhotoLens& lens, int picture
       next = Moved(pose, SymmetricSolver(damped).Solve(here.right));
       there = EquationsAt(set, lens, next, picture, half);
       damping *= there.squares <= here.squares ? 0.1 : 10;
-    } while (!(there.squares <= here.squares) && damping < kMaxDamping);
+    } while (!(there.squares <= here.squares) && damping < kBoardRules.max_damping);
     if (!(there.squares <= here.squares)) break;
-    const bool converged = here.squares - there.squares <= kConverged * here.squares;
+    const bool converged = here.squares - there.squares <= kBoardRules.converged * here.squares;
     pose = next;
     here = there;
     damping = std::max(damping, 1e-12);

@@ -6,6 +6,7 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/diagnosis/boards/board_diagnosis.h"
+#include "server/diagnosis/boards/rules.h"
 #include "server/diagnosis/engine/competition/competition.h"
 #include "server/diagnosis/engine/fit/held_out.h"
 #include "server/effects/all_effects.h"
@@ -13,14 +14,11 @@
 namespace touchstone::diagnosis::boards {
 namespace {
 
-// Corners that are met exactly (made up ones) have no likelihood: nothing is better than a thousandth of a pixel.
-constexpr double kFloorPx = 1e-3;
-
 // A gain is claimed where pictures agree on it: two standard errors over them; a share of the error is not asked, since a
 // lens that is off by little shows in a few corners only.
 engine::SearchRules RulesOfBoards() {
   engine::SearchRules rules;
-  rules.enter_nats = rules.equivalent_nats = kMinGainNats;
+  rules.enter_nats = rules.equivalent_nats = kBoardRules.min_gain_nats;
   rules.min_relative_cv_gain = 0;
   rules.min_cv_gain_std_errors = 2;
   return rules;
@@ -29,7 +27,7 @@ engine::SearchRules RulesOfBoards() {
 }  // namespace
 
 BoardSearch::BoardSearch(std::unique_ptr<BoardRows> rows)
-    : rows_(std::move(rows)), likelihood_(rows_->GroupRows(), nullptr, kFloorPx, nullptr) {
+    : rows_(std::move(rows)), likelihood_(rows_->GroupRows(), nullptr, kBoardRules.floor_px, nullptr) {
   experiment_.observations = rows_.get();
   experiment_.likelihood = &likelihood_;
   likelihood_.SetEliminated(rows_->EliminatedValues());
@@ -118,14 +116,14 @@ absl::StatusOr<engine::TriedPValues> BoardSearch::TryAll(uint64_t seed) const {
   }
   hypotheses.Add(together);
   const Eigen::VectorXd residual = tried.given.columns.values.col(0);
-  if (residual.norm() < kFloorPx * std::sqrt(static_cast<double>(rows_->rows())))
+  if (residual.norm() < kBoardRules.floor_px * std::sqrt(static_cast<double>(rows_->rows())))
     return engine::AgreeingPValues(hypotheses.size());
   return hypotheses.PValues(engine::DataAndNoise(*rows_, residual, seed));
 }
 
 double LackOfFitP(const LensFit& less, const LensFit& more) {
   const engine::HeldOutFall fall =
-      engine::FallOfHeldOut(less.unseen_px2, more.unseen_px2, kFloorPx * kFloorPx);
+      engine::FallOfHeldOut(less.unseen_px2, more.unseen_px2, kBoardRules.floor_px * kBoardRules.floor_px);
   if (!(fall.std_error > 0)) return fall.mean > 0 ? 0 : 1;
   return StudentTail(fall.mean / fall.std_error, static_cast<double>(more.unseen_px2.size()) - 1);
 }
