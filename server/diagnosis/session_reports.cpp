@@ -18,6 +18,7 @@
 #include "server/diagnosis/report/join.h"
 #include "server/diagnosis/report/kinds/from_sessions.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
+#include "server/diagnosis/report/words/rules.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/touch_reports.h"
@@ -329,7 +330,7 @@ class SessionsReporter {
     else if (changes().moved())
       diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kWrongValues);
     for (const report::Sessions::Pair& pair : diagnosis_.sessions->same_poses)
-      if (pair.left.poses > 0 && pair.left.p < report::kSamePosesP)
+      if (pair.left.poses > 0 && pair.left.p < report::kWordsRules.same_poses_p)
         diagnosis_.verdict = report::WorseOf(diagnosis_.verdict, Verdict::kUnexplained);
   }
 

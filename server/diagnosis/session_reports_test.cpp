@@ -6,6 +6,7 @@
 #include "server/base/numbers/random.h"
 #include "server/base/test_tier.h"
 #include "server/diagnosis/diagnose.h"
+#include "server/diagnosis/report/words/rules.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/touches/simulated_test_set.h"
 
@@ -119,7 +120,7 @@ TEST(Sessions, AChangeThatNoValueDescribesIsSaidToBeUnexplained) {
   }
   inputs[1].set = set;
   const report::Diagnosis found = DiagnoseAll(inputs);
-  EXPECT_LT(found.sessions->same_poses[0].left.p, report::kSamePosesP);
+  EXPECT_LT(found.sessions->same_poses[0].left.p, report::kWordsRules.same_poses_p.value());
   EXPECT_EQ(found.verdict, Verdict::kUnexplained) << found.summary;
   EXPECT_NE(found.summary.find("no value of the model describes"), std::string::npos) << found.summary;
 }

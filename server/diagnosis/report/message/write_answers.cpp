@@ -5,11 +5,10 @@
 #include "server/base/units.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/message/message_parts.h"
+#include "server/diagnosis/report/message/rules.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
-
-constexpr double kToldAtOnce = 1.05;  // of the size that is found
 
 void WriteDeciding(const std::vector<residuals::DecidingTouch>& touches,
                    const std::vector<std::string>& fingers,
@@ -41,7 +40,8 @@ void WriteDetectable(const engine::DetectableValue& value, v1::DetectableEffect*
   message->set_rival(value.rival);
   message->set_correlation(value.correlation);
   if (value.told_from) message->set_told_from(*value.told_from);
-  const bool told_at_once = value.told_from && *value.told_from <= kToldAtOnce * *value.found_from;
+  const bool told_at_once =
+      value.told_from && *value.told_from <= kMessageRules.told_at_once * *value.found_from;
   if (!value.rival.empty() && value.found_from && !told_at_once)
     message->set_parted_by(engine::DeclaredMeasurement(
         value.effect->name, std::string(absl::StripPrefix(value.rival, engine::kGivenPrefix))));

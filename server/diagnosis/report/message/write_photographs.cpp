@@ -3,14 +3,12 @@
 #include <cmath>
 
 #include "server/base/check.h"
+#include "server/diagnosis/report/message/rules.h"
 #include "server/diagnosis/report/message/write_data_report.h"
 #include "server/image/encoding/encode.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
-
-constexpr double kMinScaleGrey = 8;    // of residual maps
-constexpr double kScaleShare = 0.995;  // of the pixels that the scale covers
 
 std::string PngOf(const std::vector<uint8_t>& pixels, int width, int height, int channels) {
   absl::StatusOr<std::string> png = image::EncodePng(pixels.data(), width, height, channels);
@@ -28,9 +26,11 @@ void WriteMap(const images::PhotographMap& map, v1::PhotographMap* message) {
   // One scale for both, so that what has fallen looks as if it had.
   std::vector<float> sizes = map.residual_before_grey;
   for (float& size : sizes) size = std::abs(size);
-  const size_t place = std::min(sizes.size() - 1, static_cast<size_t>(kScaleShare * sizes.size()));
+  const size_t place =
+      std::min(sizes.size() - 1, static_cast<size_t>(kMessageRules.scale_share * sizes.size()));
   std::nth_element(sizes.begin(), sizes.begin() + place, sizes.end());
-  const double scale = std::max(kMinScaleGrey, std::ceil(static_cast<double>(sizes[place])));
+  const double scale =
+      std::max(kMessageRules.min_scale_grey.value(), std::ceil(static_cast<double>(sizes[place])));
   message->set_residual_scale(scale);
   message->set_residual_before_png(PngOf(ResidualColours(map.residual_before_grey, scale), width, height, 3));
   message->set_residual_after_png(PngOf(ResidualColours(map.residual_after_grey, scale), width, height, 3));

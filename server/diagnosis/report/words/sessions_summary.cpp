@@ -7,15 +7,13 @@
 
 #include "server/base/files/file_label.h"
 #include "server/base/text/value_text.h"
+#include "server/diagnosis/report/words/rules.h"
 #include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
 
 constexpr double kMinP = 1e-300;
-constexpr size_t kMaxRuns =
-    4;  // of a value that changed; of more, the two sessions that differ most are named
-constexpr size_t kMaxNames = 3;  // of a run; of more, its first and its last
 
 std::string ValueName(const joint::ComparedEffect& effect, const engine::ParameterEstimate& value) {
   return absl::StrCat(effect.effect, " ", value.name,
@@ -28,7 +26,7 @@ std::string CourseInWords(const Sessions& sessions, const std::vector<DataReport
                           const joint::ComparedEffect& effect, const joint::ComparedValue& value) {
   const engine::ParameterEstimate& named = *value.by_session[value.from];
   std::vector<joint::SessionRun> runs = value.runs;
-  const bool many = runs.size() < 2 || runs.size() > kMaxRuns;
+  const bool many = runs.size() < 2 || runs.size() > kWordsRules.max_runs;
   if (many) {
     runs.clear();
     for (const int session : {value.from, value.to})
@@ -40,11 +38,12 @@ std::string CourseInWords(const Sessions& sessions, const std::vector<DataReport
     for (const int session : run.sessions) names.push_back(SessionName(data, sessions.taking_part[session]));
     const size_t count = names.size();
     parts.push_back(absl::StrCat(ValueWithError(run.mean.value, run.mean.std_error), " ", named.unit, " in ",
-                                 count > kMaxNames ? absl::StrCat(names.front(), " to ", names.back())
-                                                   : absl::StrJoin(names, " and ")));
+                                 count > kWordsRules.max_names
+                                     ? absl::StrCat(names.front(), " to ", names.back())
+                                     : absl::StrJoin(names, " and ")));
   }
   return absl::StrCat(ValueName(effect, named), " from ", absl::StrJoin(parts, " to "),
-                      many && value.runs.size() > kMaxRuns ? ", and in others between" : "");
+                      many && value.runs.size() > kWordsRules.max_runs ? ", and in others between" : "");
 }
 
 std::string ChangedInWords(const Sessions& sessions, const std::vector<DataReport>& data,
@@ -108,16 +107,16 @@ std::string SessionsInWords(const Sessions& sessions, const std::vector<DataRepo
   for (const Sessions::Pair& pair : sessions.same_poses) {
     const bool modelled = sessions.changes && sessions.changes->moved();
     const touches::SamePoses& shown = modelled ? pair.left : pair.measured;
-    if (shown.p >= kSamePosesP && sessions.same_poses.size() > 1) continue;
+    if (shown.p >= kWordsRules.same_poses_p && sessions.same_poses.size() > 1) continue;
     sentences.push_back(absl::StrFormat(
         "On the %d poses that both %s and %s touched, contact times %sdiffer by %.3g ms from pose to pose, "
         "where noise lets expect %.3g ms (p = %.1g)%s",
         shown.poses, SessionName(data, pair.from), SessionName(data, pair.to),
         modelled ? "less what each session's model expects " : "", shown.rms_s * 1e3, shown.expected_s * 1e3,
         std::max(shown.p, kMinP),
-        shown.p >= kSamePosesP ? "."
-        : sessions.changes     ? ": something changed that no value of the model describes."
-                               : ": the sessions differ, whatever the model."));
+        shown.p >= kWordsRules.same_poses_p ? "."
+        : sessions.changes                  ? ": something changed that no value of the model describes."
+                                            : ": the sessions differ, whatever the model."));
   }
   if (!unexplained.empty() && sessions.changes && sessions.changes->changed()) {
     std::vector<std::string> names;

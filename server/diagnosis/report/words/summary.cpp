@@ -12,14 +12,13 @@
 #include "server/base/text/value_text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/words/distributions_summary.h"
+#include "server/diagnosis/report/words/rules.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
 #include "server/session/images/emulated.h"
 
 namespace touchstone::diagnosis::report {
 namespace {
-
-constexpr int kFewTouches = 100, kFewPictures = 30;
 
 // How a kind's measurements are called.
 struct Words {
@@ -70,12 +69,10 @@ std::string HowWrong(const DataReport& data) {
 
 // Repeats that scatter by more or by less than the model says. Empty: as it says.
 std::string FloorAgainstModel(DataKind kind, const NoiseFloor& floor) {
-  constexpr double kBeyond = 1.7;  // half widths of the 95 % interval: 3.3 standard errors
-  constexpr double kRelevant = 0.02;
   if (!floor.from_repeats || !(floor.declared > 0)) return "";
   const double apart = floor.sigma - floor.declared;
-  if (std::abs(apart) < kRelevant * floor.declared ||
-      std::abs(apart) < kBeyond * 0.5 * (floor.upper - floor.lower))
+  if (std::abs(apart) < kWordsRules.noise_differs_share * floor.declared ||
+      std::abs(apart) < kWordsRules.noise_differs_widths * 0.5 * (floor.upper - floor.lower))
     return "";
   return absl::StrFormat(
       "Repeats scatter by %s (%s to %s), where the model says %s of noise: %s",
@@ -222,8 +219,7 @@ std::string ErrorInWords(DataKind kind, double error) {
 }
 
 std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& parameters) {
-  constexpr int kMaxShown = 4;
-  if (parameters.size() > kMaxShown) return absl::StrCat(parameters.size(), " values");
+  if (parameters.size() > kWordsRules.max_values_shown) return absl::StrCat(parameters.size(), " values");
   std::vector<std::string> texts;
   for (const engine::ParameterEstimate& value : parameters) texts.push_back(ValueInWords(value));
   return absl::StrJoin(texts, ", ");
@@ -246,7 +242,7 @@ std::vector<std::string> DataWarnings(const DataReport& data) {
     warnings.push_back(NothingUsed(data.kind));
     return warnings;
   }
-  if (data.count < (touches ? kFewTouches : kFewPictures))
+  if (data.count < (touches ? kWordsRules.few_touches.value() : kWordsRules.few_pictures.value()))
     warnings.push_back(absl::StrCat("Only ", data.count, " ", data.count == 1 ? words.one : words.many,
                                     " took part: weak effects stay unseen, and errors are rough."));
   if (data.objects.size() == 1)

@@ -24,8 +24,6 @@ std::vector<std::string> DataWarnings(const DataReport& data);
 // found elsewhere are in the model already.
 std::string Summarize(const Diagnosis& diagnosis, bool others_in_place = false);
 
-// Poses that two sessions touched differ beyond noise: P below which that is no chance.
-inline constexpr double kSamePosesP = 1e-4;
 // What changed between sessions, and whether the poses that they share agree: a few sentences.
 // `unexplained`: sessions with a rest under their own models.
 std::string SessionsInWords(const Sessions& sessions, const std::vector<DataReport>& data,
