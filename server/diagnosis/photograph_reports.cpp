@@ -13,13 +13,10 @@
 #include "server/diagnosis/report/kinds/from_photographs.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/residuals/photographs/describe_photographs.h"
+#include "server/diagnosis/rules.h"
 
 namespace touchstone::diagnosis {
 namespace {
-
-constexpr int kDefaultPhotographs = 6;  // proposed by Diagnose where something is confounded
-// Errors without odd pictures over those with them, above which the others are as wrong: it is no mistake of single pictures.
-constexpr double kMaxLeftByOthers = 0.7;
 
 using Engine = std::function<absl::StatusOr<images::PhotographDiagnosis>(images::Expectation*)>;
 
@@ -57,7 +54,8 @@ engine::DataProblem WithErrors(const checks::PhotoMistake& mistake, const Diagno
 bool IsOfAllPictures(const checks::PhotoMistake& mistake, const DiagnosisInput& input, ThreadPool* pool) {
   if (mistake.problem.kind != engine::ProblemKind::kOddPicture) return false;
   const double before_grey = GreyErrorOf(input, pool);
-  return !(WithErrors(mistake, input, before_grey, pool).error_after < kMaxLeftByOthers * before_grey);
+  return !(WithErrors(mistake, input, before_grey, pool).error_after <
+           kDiagnosisRules.max_left_by_others * before_grey);
 }
 
 absl::StatusOr<report::Diagnosis> Reported(const DiagnosisInput& input, const DiagnosisContext& context,
@@ -154,7 +152,7 @@ absl::StatusOr<report::Diagnosis> ComparePhotographSet(const DiagnosisInput& inp
 absl::StatusOr<report::Diagnosis> DiagnosePhotographSet(const DiagnosisInput& input,
                                                         const DiagnosisContext& context) {
   return DataErrorsFirst(input, context, [&](images::Expectation* expectation) {
-    return DiagnosedWithNext(input, kDefaultPhotographs, false, context, expectation);
+    return DiagnosedWithNext(input, kDiagnosisRules.default_photographs, false, context, expectation);
   });
 }
 

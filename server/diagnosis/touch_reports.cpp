@@ -23,6 +23,7 @@
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/residuals/touches/describe_residuals.h"
+#include "server/diagnosis/rules.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 #include "server/diagnosis/selection/quality.h"
 #include "server/diagnosis/selection/touch_modality.h"
@@ -31,7 +32,6 @@
 namespace touchstone::diagnosis {
 namespace {
 
-constexpr int kDefaultTouches = 8;  // proposed by Diagnose where something is confounded
 constexpr char kCancelled[] = "the diagnosis was cancelled";
 
 double Now() {
@@ -311,7 +311,7 @@ absl::StatusOr<report::Diagnosis> CompareTouches(const DiagnosisInput& given,
 
 absl::StatusOr<report::Diagnosis> DiagnoseTouches(const DiagnosisInput& input,
                                                   const DiagnosisContext& context) {
-  return WithPhotographEffects(input, kDefaultTouches, false, context);
+  return WithPhotographEffects(input, kDiagnosisRules.default_touches, false, context);
 }
 
 absl::StatusOr<report::Diagnosis> ProposeTouches(const DiagnosisInput& input, int max_touches,

@@ -7,21 +7,13 @@
 #include <set>
 
 #include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/answers/rules.h"
 #include "server/diagnosis/checks/data_problems.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 
 namespace touchstone::diagnosis {
 namespace {
-
-// Degrees of freedom that a verdict needs, one per contrast (fingers - 1 of each touch). The largest effect of the
-// catalogue, object_pose, takes six values and the noise one. What is left must show a misfit that doubles the noise's
-// variance: with 24 degrees F is above 1.8 in 1 of 100 cases, with 8 above 2.5, and a fit of seven values to twelve
-// numbers finds an effect in anything.
-constexpr int kFittedValues = 7;
-constexpr int kLeft = 24;
-// Repeats of one touch say nothing of the model: as many values must come from different touches.
-constexpr int kMinPoses = 4;
 
 report::Diagnosis ReportOf(const selection::Workspace& workspace) {
   report::Diagnosis diagnosis = BeginDiagnosis(workspace);
@@ -79,14 +71,14 @@ int TouchesNeeded(const touches::Observations& o) {
       reporting += !std::isnan(o.time_s[static_cast<size_t>(k) * o.fingers + i]);
     contrasts += reporting - 1;
   }
-  const int needed = kFittedValues + kLeft;
-  if (contrasts >= needed && static_cast<int>(poses.size()) >= kMinPoses) return 0;
+  const int needed = kAnswerRules.fitted_values + kAnswerRules.spare_degrees_of_freedom;
+  if (contrasts >= needed && static_cast<int>(poses.size()) >= kAnswerRules.min_poses) return 0;
   // Fingers that stay silent make more touches necessary.
   const double per_touch = used > 0 ? static_cast<double>(contrasts) / used : o.fingers - 1;
   const int touches = static_cast<int>(std::ceil(needed / std::max(per_touch, 1.0)));
-  return static_cast<int>(poses.size()) >= kMinPoses
+  return static_cast<int>(poses.size()) >= kAnswerRules.min_poses
              ? touches
-             : std::max(touches, used + kMinPoses - static_cast<int>(poses.size()));
+             : std::max(touches, used + kAnswerRules.min_poses - static_cast<int>(poses.size()));
 }
 
 report::Diagnosis TooLittleDataReport(const selection::Workspace& workspace, int touches_needed) {

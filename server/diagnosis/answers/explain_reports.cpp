@@ -13,6 +13,7 @@
 #include "server/base/units.h"
 #include "server/diagnosis/answers/early_verdicts.h"
 #include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/answers/rules.h"
 #include "server/diagnosis/report/kinds/from_touches.h"
 #include "server/diagnosis/report/words/summary.h"
 #include "server/diagnosis/selection/candidates.h"
@@ -21,9 +22,6 @@
 
 namespace touchstone::diagnosis {
 namespace {
-
-constexpr size_t kDeciding = 5;  // touches that speak for an effect, and against it
-constexpr double kAsGood = 3;    // nats between two effects that explain about the same
 
 std::string ValuesInWords(const std::vector<engine::ParameterEstimate>& values) {
   std::vector<std::string> words;
@@ -76,12 +74,13 @@ std::string Words(const report::ReportedExplanation& explained, double rmse_us) 
   const engine::TakenOver* rival = StrongestRival(found);
   if (rival == nullptr) return words + " No other effect does a part of the same.";
   const std::string other = NameInWords(rival->effect);
-  if (rival->gain_nats > found.gain_nats + kAsGood)
+  const double equivalent_nats = engine::SearchRules().equivalent_nats;
+  if (rival->gain_nats > found.gain_nats + equivalent_nats)
     return absl::StrCat(
         words, absl::StrFormat(" %s alone gains %.0f nats, and does %.0f %% of what %s does: it explains "
                                "these touches better.",
                                other, rival->gain_nats, 100 * rival->share, name));
-  if (rival->gain_nats > found.gain_nats - kAsGood)
+  if (rival->gain_nats > found.gain_nats - equivalent_nats)
     return absl::StrCat(words, " ", other,
                         " explains them as well: ", engine::DiscriminatingMeasurement({name, rival->effect}));
   return absl::StrCat(words, absl::StrFormat(" The best of what resembles it, %s, gains %.0f nats.", other,
@@ -150,8 +149,10 @@ absl::StatusOr<report::Diagnosis> ExplainTouches(const DiagnosisInput& given, co
     explained.quality = report::InMicroseconds(quality);
     const std::vector<double> after = touches::Residuals(o, prediction);
     const double sigma_s = std::max(diagnosis.data[0].noise_floor->sigma * kSecondsPerMicrosecond, 1e-12);
-    explained.speak_for = residuals::FindDecidingTouches(o, before, after, sigma_s, kDeciding, false);
-    explained.speak_against = residuals::FindDecidingTouches(o, before, after, sigma_s, kDeciding, true);
+    explained.speak_for =
+        residuals::FindDecidingTouches(o, before, after, sigma_s, kAnswerRules.max_deciding, false);
+    explained.speak_against =
+        residuals::FindDecidingTouches(o, before, after, sigma_s, kAnswerRules.max_deciding, true);
   }
   explained.words = Words(explained, diagnosis.data[0].initial->rmse);
   if (diagnosis.verdict == engine::Verdict::kTooLittleData)

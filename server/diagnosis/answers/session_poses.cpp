@@ -4,12 +4,11 @@
 
 #include "server/base/status.h"
 #include "server/base/units.h"
+#include "server/diagnosis/answers/rules.h"
 #include "server/diagnosis/selection/workspace.h"
 
 namespace touchstone::diagnosis {
 namespace {
-
-constexpr size_t kMaxSessionPairs = 8;  // as many as a person reads
 
 // What one model leaves of a session.
 struct LeftBy {
@@ -37,7 +36,7 @@ absl::StatusOr<std::vector<report::Sessions::Pair>> CompareSharedPoses(
     const std::vector<SessionOnPoses>& sessions, const DiagnosisContext& context) {
   std::vector<report::Sessions::Pair> pairs;
   LeftBy measured_before, left_before;
-  for (size_t s = 0; s < sessions.size() && s <= kMaxSessionPairs; ++s) {
+  for (size_t s = 0; s < sessions.size() && s <= kAnswerRules.max_session_pairs; ++s) {
     const SessionOnPoses& one = sessions[s];
     LeftBy measured, left;
     if (one.noise_floor && one.noise_floor->sigma > 0) {

@@ -10,6 +10,7 @@
 #include "server/base/text/file_number.h"
 #include "server/base/units.h"
 #include "server/diagnosis/answers/how_wrong.h"
+#include "server/diagnosis/answers/rules.h"
 #include "server/diagnosis/design/plan_check.h"
 #include "server/diagnosis/selection/touch_modality.h"
 #include "server/diagnosis/selection/workspace.h"
@@ -20,8 +21,6 @@ namespace touchstone::diagnosis {
 namespace {
 
 using uncertainty::Budget;
-
-constexpr double kAtBound = 1e-6;  // of the range
 
 void PaintPoints(const touches::Observations& o, const touches::Prediction& prediction,
                  const touches::SetUncertainty& found, std::vector<residuals::SurfaceResidual>* points) {
@@ -84,7 +83,7 @@ void WarnOfBounds(const uncertainty::Posterior& posterior, std::vector<std::stri
   for (size_t i = 0; i < posterior.values.size(); ++i) {
     const double value = posterior.ValueOf(posterior.model, i);
     const double lower = posterior.Lower(i), upper = posterior.Upper(i);
-    const double near = kAtBound * (upper - lower);
+    const double near = kAnswerRules.at_bound * (upper - lower);
     if (posterior.StdError(i) > near || (value - lower > near && upper - value > near)) continue;
     const model::ParameterInfo& parameter = posterior.ParameterOf(i);
     const uncertainty::OpenValue& open = posterior.values[i];
