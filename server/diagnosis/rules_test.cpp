@@ -14,6 +14,40 @@
 #include "server/base/numbers/rule.h"
 #include "server/base/test_paths.h"
 #include "server/base/text/text.h"
+#include "server/diagnosis/answers/rules.h"
+#include "server/diagnosis/boards/rules.h"
+#include "server/diagnosis/checks/photographs/rules.h"
+#include "server/diagnosis/checks/rows/rules.h"
+#include "server/diagnosis/checks/rules.h"
+#include "server/diagnosis/design/rules.h"
+#include "server/diagnosis/distributions/rules.h"
+#include "server/diagnosis/engine/competition/rules.h"
+#include "server/diagnosis/engine/fit/rules.h"
+#include "server/diagnosis/engine/ladder/rules.h"
+#include "server/diagnosis/engine/rules.h"
+#include "server/diagnosis/engine/search/rules.h"
+#include "server/diagnosis/images/pixels/rules.h"
+#include "server/diagnosis/images/rows/rules.h"
+#include "server/diagnosis/images/rules.h"
+#include "server/diagnosis/images/search/rules.h"
+#include "server/diagnosis/images/terms/rules.h"
+#include "server/diagnosis/joint/rules.h"
+#include "server/diagnosis/report/message/rules.h"
+#include "server/diagnosis/report/words/rules.h"
+#include "server/diagnosis/residuals/distribution/rules.h"
+#include "server/diagnosis/residuals/photographs/rules.h"
+#include "server/diagnosis/residuals/rules.h"
+#include "server/diagnosis/residuals/slices/rules.h"
+#include "server/diagnosis/residuals/touches/rules.h"
+#include "server/diagnosis/rules.h"
+#include "server/diagnosis/selection/curves/rules.h"
+#include "server/diagnosis/selection/ladder/rules.h"
+#include "server/diagnosis/selection/rules.h"
+#include "server/diagnosis/selection/scatter/rules.h"
+#include "server/diagnosis/selection/session/rules.h"
+#include "server/diagnosis/selection/surface/rules.h"
+#include "server/diagnosis/touches/noise/rules.h"
+#include "server/diagnosis/touches/rules.h"
 
 namespace touchstone::diagnosis {
 namespace {
@@ -24,7 +58,40 @@ struct Room {
 };
 
 std::vector<Room> Rooms() {
-  return {};
+  return {{"answers", ListRules(kAnswerRules)},
+          {"boards", ListRules(boards::kBoardRules)},
+          {"checks.photographs", ListRules(checks::kPhotoCheckRules)},
+          {"checks.rows", ListRules(checks::kRowCheckRules)},
+          {"checks", ListRules(checks::kCheckRules)},
+          {"design", ListRules(design::kDesignRules)},
+          {"distributions", ListRules(distributions::kDistributionRules)},
+          {"engine.competition", ListRules(engine::kCompetitionRules)},
+          {"engine.fit", ListRules(engine::kFitRules)},
+          {"engine.ladder", ListRules(engine::kLadderRules)},
+          {"engine", ListRules(engine::kEngineRules)},
+          {"engine.search", ListRules(engine::kCandidateRules)},
+          {"images.pixels", ListRules(images::kPixelRules)},
+          {"images.rows", ListRules(images::kPhotoRowRules)},
+          {"images", ListRules(images::kImageRules)},
+          {"images.search", ListRules(images::kPhotoSearchRules)},
+          {"images.terms", ListRules(images::kPhotoTermRules)},
+          {"joint", ListRules(joint::kJointRules)},
+          {"report.message", ListRules(report::kMessageRules)},
+          {"report.words", ListRules(report::kWordsRules)},
+          {"residuals.distribution", ListRules(residuals::kDistributionRules)},
+          {"residuals.photographs", ListRules(residuals::kPhotographResidualRules)},
+          {"residuals", ListRules(residuals::kResidualRules)},
+          {"residuals.slices", ListRules(residuals::kSliceRules)},
+          {"residuals.touches", ListRules(residuals::kTouchResidualRules)},
+          {"diagnosis", ListRules(kDiagnosisRules)},
+          {"selection.curves", ListRules(selection::kCurveRules)},
+          {"selection.ladder", ListRules(selection::kLadderRules)},
+          {"selection", ListRules(selection::kSelectionRules)},
+          {"selection.scatter", ListRules(selection::kScatterRules)},
+          {"selection.session", ListRules(selection::kSessionRules)},
+          {"selection.surface", ListRules(selection::kSurfaceRules)},
+          {"touches.noise", ListRules(touches::kNoiseRules)},
+          {"touches", ListRules(touches::kTouchRules)}};
 }
 
 TEST(Rules, HaveTheNameOfTheirFolderAndNoOther) {

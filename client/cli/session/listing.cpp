@@ -3,7 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
-#include "client/cli/session/verify.h"
+#include "client/cli/session/trash.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
 

@@ -50,7 +50,7 @@ struct ImageRules {
                   5,
                   "",
                   "Into so many parts the poses are cut; what is fitted to the others is tried on each.",
-                  "Not recorded. (kKindFolds, the size of an array, has the same number.)",
+                  "Not recorded; kKindFolds, the size of an array, has the same number.",
                   "Not measured."};
   Rule<int> object_cells{"images.object_cells",
                          6,

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "server/base/status.h"
+#include "server/diagnosis/selection/curves/curve_effect.h"
+#include "server/diagnosis/selection/memory_competition.h"
 #include "server/diagnosis/selection/rules.h"
-#include "server/diagnosis/selection/scatter/declared_noise.h"
-#include "server/diagnosis/selection/session/rules.h"
-#include "server/diagnosis/selection/session/time_structure.h"
-#include "server/effects/formula/lookup.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -22,42 +23,63 @@ struct WithCurve {
   double total() const { return fit.log_evidence + curve.gain_nats; }
 };
 
-// To a multiple of a power of ten; such a power is exact upwards only.
-double RoundedToDigits(double value, double unit) {
-  return unit >= 1 ? std::round(value / unit) * unit : std::round(value / unit) / std::round(1 / unit);
-}
-
 class Competition {
  public:
   Competition(const Workspace& workspace, SelectionResult* result)
       : workspace_(workspace), result_(*result) {}
 
+  // From the first row to the first that settles how the rest is explained.
   absl::Status Run() {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool partial, IsPartial());
-    if (partial) return absl::OkStatus();
-    engine::Fit named = result_.without_formula;
-    TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(named, ""));
-    TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named));
-    std::vector<WithCurve> found;
-    for (const NamelessCurve& curve : result_.curves) {
-      if (static_cast<int>(found.size()) == kSelectionRules.max_curves_tried || !IsSignificant(curve)) break;
-      WithCurve with{named, curve};
-      TOUCHSTONE_RETURN_IF_ERROR(DropSuperfluous(&with));
-      found.push_back(std::move(with));
+    for (const Stage& stage : kStages) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(const bool settled, (this->*stage.settles)());
+      if (settled) break;
     }
-    const auto best =
-        std::max_element(found.begin(), found.end(),
-                         [](const WithCurve& a, const WithCurve& b) { return a.total() < b.total(); });
-    if (best == found.end()) return LookForMemory(named);
-    if (result_.formula >= 0 && FormulaSaysTheSame(*best)) return DescribeBesideFormula();
-    if (best->curve.of_time) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(const bool correlated, IsNoiseWithMemory(*best));
-      if (correlated) return absl::OkStatus();
-    }
-    return Adopt(*best);
+    return absl::OkStatus();
   }
 
  private:
+  struct Stage {
+    const char* explanation;
+    const char* why_here;
+    absl::StatusOr<bool> (Competition::*settles)();
+  };
+  static const std::vector<Stage> kStages;
+
+  // Curves over what stays of the effects; the best of them.
+  absl::StatusOr<bool> FindCurves() {
+    named_ = result_.without_formula;
+    TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(named_, ""));
+    TOUCHSTONE_RETURN_IF_ERROR(ReplaceOvertaken(&named_));
+    int tried = 0;
+    for (const NamelessCurve& curve : result_.curves) {
+      if (tried == kSelectionRules.max_curves_tried || !IsSignificant(curve)) break;
+      WithCurve with{named_, curve};
+      TOUCHSTONE_RETURN_IF_ERROR(DropSuperfluous(&with));
+      if (!best_ || best_->total() < with.total()) best_ = std::move(with);
+      ++tried;
+    }
+    return false;
+  }
+
+  absl::StatusOr<bool> IsMemoryWithoutCurve() {
+    if (best_) return false;
+    TOUCHSTONE_RETURN_IF_ERROR(LookForMemory(workspace_, named_, &result_).status());
+    return true;
+  }
+
+  // The formula stays; a curve of its covariate is given beside it.
+  absl::StatusOr<bool> IsFormula() {
+    if (result_.formula < 0 || !FormulaSaysTheSame(*best_)) return false;
+    for (const NamelessCurve& curve : result_.curves)
+      if (curve.covariate == result_.term.covariate) result_.curve = curve;
+    return true;
+  }
+
+  absl::StatusOr<bool> IsMemoryInPlaceOfCourse() {
+    if (!best_->curve.of_time) return false;
+    return TakeNoiseWithMemory(workspace_, best_->fit, best_->curve.gain_nats, &result_);
+  }
+
   absl::StatusOr<std::vector<NamelessCurve>> CurvesOver(const engine::Fit& fit,
                                                         const std::string& only) const {
     if (workspace_.experiment.cancelled && workspace_.experiment.cancelled())
@@ -68,7 +90,7 @@ class Competition {
   }
 
   // An offset that a part of the touches has, in the place of constants and drifts of each finger.
-  absl::StatusOr<bool> IsPartial() {
+  absl::StatusOr<bool> IsPartialOffset() {
     if (result_.formula >= 0) return false;
     engine::Parameterization rest = result_.fit.model;
     for (int index = static_cast<int>(rest.base().effects.size()) - 1; index >= result_.initial_effects;
@@ -103,12 +125,6 @@ class Competition {
     return absl::OkStatus();
   }
 
-  void NoteRival(const std::string& name, double ahead_nats, const std::string& words) {
-    const auto [rival, is_new] = result_.nameless_rivals.try_emplace(name);
-    if (!is_new && rival->second.ahead_nats >= ahead_nats) return;
-    rival->second = {ahead_nats, words};
-  }
-
   static bool IsPerFinger(const model::Effect& effect) {
     return effect.parameters.size() == 1 && effect.parameters[0].arity == model::Arity::kPerFinger;
   }
@@ -123,22 +139,15 @@ class Competition {
     const model::Effect& effect = *named.model.base().effects[index].effect;
     if (!IsPerFinger(effect) || named.log_evidence - without.log_evidence > kSelectionRules.beyond_correlated)
       return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> with, MemoryOf(named));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> alone, MemoryOf(without));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> with, MemoryOf(workspace_, named));
+    TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> alone, MemoryOf(workspace_, without));
     if (!with || !alone) return absl::OkStatus();
     const double own = std::max(with->white_log_likelihood, with->log_likelihood - with->complexity_nats) -
                        0.5 * (workspace_.searched->fingers - 1) * with->complexity_nats;
     const double ahead_nats = alone->log_likelihood - alone->complexity_nats - own;
-    NoteRival(engine::NameOf(effect), ahead_nats,
-              "Correlated noise of the fingers would say nearly the same.");
+    NoteRival(engine::NameOf(effect),
+              {ahead_nats, "Correlated noise of the fingers would say nearly the same."}, &result_);
     return absl::OkStatus();
-  }
-
-  absl::StatusOr<std::optional<NoiseMemory>> MemoryOf(const engine::Fit& fit) const {
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.searched_predictor->Run(fit.model.base(), false, false));
-    const touches::Observations& o = *workspace_.searched;
-    return FindNoiseMemory(o, touches::Residuals(o, prediction));
   }
 
   static std::string RivalInWords(const NamelessCurve& curve) {
@@ -186,7 +195,7 @@ class Competition {
     // What a curve says beside the effects as well is no rival of theirs.
     const double any_beside = stands && !beside.empty() ? std::max(0.0, beside[0].any_gain_nats) : 0;
     for (const std::string& name : names)
-      NoteRival(name, behind + curves[0].any_gain_nats - any_beside, RivalInWords(curves[0]));
+      NoteRival(name, {behind + curves[0].any_gain_nats - any_beside, RivalInWords(curves[0])}, &result_);
     if (steps.size() == 1) TOUCHSTONE_RETURN_IF_ERROR(NoteCorrelatedNoise(steps[0], *named, without));
     if (stands || !IsSignificant(curves[0]) || behind + curves[0].gain_nats < kSelectionRules.overtaken)
       return false;
@@ -218,64 +227,6 @@ class Competition {
     }
   }
 
-  // Correlated noise has no course that another session would repeat: it is noise, which a curve only traces.
-  absl::StatusOr<bool> IsNoiseWithMemory(const WithCurve& with) {
-    TOUCHSTONE_ASSIGN_OR_RETURN(std::optional<NoiseMemory> memory, MemoryOf(with.fit));
-    if (!memory) return false;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(with.fit));
-    const double course = std::max({with.curve.gain_nats, memory->step_gain_nats, memory->period_gain_nats});
-    if (declared ? course > memory->gain_nats + kSelectionRules.memory_ahead ||
-                       memory->smooth_gain_nats > memory->gain_nats + kSelectionRules.memory_ahead
-                 : !memory->everywhere || memory->gain_nats < course + kSelectionRules.memory_ahead ||
-                       memory->gain_nats < memory->smooth_gain_nats + kSelectionRules.memory_rougher)
-      return false;
-    result_.fit = with.fit;
-    TOUCHSTONE_RETURN_IF_ERROR(DropWhatIsCorrelated(&*memory));
-    result_.memory = std::move(memory);
-    result_.without_formula = result_.fit;
-    result_.formula = -1;
-    return true;
-  }
-
-  // Whether the given model has correlated noise that the residuals do not rule out: it is what a course must be ahead of.
-  absl::StatusOr<bool> IsDeclaredMemory(const engine::Fit& fit) const {
-    const model::EffectInstance* declared = DeclaredMemoryOf(*workspace_.input.model);
-    if (declared == nullptr) return false;
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.searched_predictor->Run(fit.model.base(), false, false));
-    const touches::Observations& o = *workspace_.searched;
-    return !AssessDeclaredMemory(o, touches::Residuals(o, prediction), declared->values[0],
-                                 declared->values[1])
-                .absent;
-  }
-
-  // Effects that were found under noise without memory must be worth their values under correlated noise too.
-  absl::Status DropWhatIsCorrelated(NoiseMemory* memory) {
-    for (int index = static_cast<int>(result_.fit.model.base().effects.size()) - 1;
-         index >= result_.initial_effects; --index) {
-      TOUCHSTONE_ASSIGN_OR_RETURN(engine::Fit without,
-                                  engine::FitModel(workspace_.experiment, result_.fit.model.Without(index)));
-      TOUCHSTONE_ASSIGN_OR_RETURN(const std::optional<NoiseMemory> other, MemoryOf(without));
-      if (!other || other->log_likelihood < memory->log_likelihood - kSelectionRules.worth_under_memory)
-        continue;
-      result_.fit = std::move(without);
-      *memory = *other;
-    }
-    return absl::OkStatus();
-  }
-
-  // No curve says how, but repeats share a course in time, or the given model says that they do.
-  absl::Status LookForMemory(const engine::Fit& named) {
-    if (result_.formula >= 0) return absl::OkStatus();
-    TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(named));
-    TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
-                                workspace_.searched_predictor->Run(named.model.base(), false, false));
-    const touches::Observations& o = *workspace_.searched;
-    if (!declared && !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kSessionRules.time_p))
-      return absl::OkStatus();
-    return IsNoiseWithMemory({named, NamelessCurve()}).status();
-  }
-
   // In fewer words, and without named effects that the curve does without.
   bool FormulaSaysTheSame(const WithCurve& with) const {
     const auto named = [&](const engine::Fit& fit) {
@@ -286,21 +237,16 @@ class Competition {
            with.total() - kSelectionRules.formula_behind + kSelectionRules.dropped * dropped;
   }
 
-  // The formula stays; a curve of its covariate is given beside it.
-  absl::Status DescribeBesideFormula() {
-    for (const NamelessCurve& curve : result_.curves)
-      if (curve.covariate == result_.term.covariate) result_.curve = curve;
-    return absl::OkStatus();
-  }
-
-  absl::Status Adopt(const WithCurve& with) {
+  // The curve becomes an effect of the model, where its covariate is one that models know.
+  absl::StatusOr<bool> IsCurve() {
+    const WithCurve& with = *best_;
     TOUCHSTONE_ASSIGN_OR_RETURN(result_.curves, CurvesOver(with.fit, ""));
     result_.curve = with.curve;
     if (with.curve.covariate == "touch") {
       // Models know session times and not rows: without such times there is nothing to add.
       result_.fit = result_.without_formula = with.fit;
       result_.formula = -1;
-      return absl::OkStatus();
+      return true;
     }
     TOUCHSTONE_ASSIGN_OR_RETURN(const auto effect, MakeCurveEffect(with.curve));
     engine::Parameterization start = with.fit.model;
@@ -312,31 +258,27 @@ class Competition {
         engine::FitModel(workspace_.experiment, result_.fit.model.Without(result_.formula)));
     result_.term = FormulaTerm();
     result_.term.covariate = with.curve.covariate;
-    return absl::OkStatus();
+    return true;
   }
 
   const Workspace& workspace_;
   SelectionResult& result_;
+  engine::Fit named_;              // without a formula, and without effects that a curve took the place of
+  std::optional<WithCurve> best_;  // none: no curve is significant
 };
 
-}  // namespace
+const std::vector<Competition::Stage> Competition::kStages = {
+    {"an offset of a part of the touches",
+     "It is one value where constants and drifts of fingers are several.", &Competition::IsPartialOffset},
+    {"curves", "What follows is compared with the best of them.", &Competition::FindCurves},
+    {"noise with memory, without a curve", "Repeats may share a course that no curve follows.",
+     &Competition::IsMemoryWithoutCurve},
+    {"a formula", "It says the same in fewer words.", &Competition::IsFormula},
+    {"noise with memory, in the place of a course",
+     "A curve only traces what another session would not repeat.", &Competition::IsMemoryInPlaceOfCourse},
+    {"a curve", "Nothing shorter says the same.", &Competition::IsCurve}};
 
-absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurveEffect(const NamelessCurve& curve) {
-  model::LookupSpec spec;
-  spec.name = NameOfRest(curve.covariate);
-  spec.adds_time = curve.adds_time;
-  spec.stage = curve.adds_time ? model::Stage::kSensor : model::Stage::kMotion;
-  spec.covariate = curve.covariate;
-  const double range = curve.knots.back() - curve.knots.front();
-  const double knot_unit = std::pow(10.0, std::floor(std::log10(std::max(range, 1e-12))) - 5);
-  for (const double knot : curve.knots) spec.knots.push_back(RoundedToDigits(knot, knot_unit));
-  const double value_unit = curve.adds_time ? 0.1 : 1e-5;  // us; mm
-  for (const std::vector<double>& values : curve.values) {
-    spec.values.emplace_back();
-    for (const double value : values) spec.values.back().push_back(RoundedToDigits(value, value_unit));
-  }
-  return effects::MakeLookupEffect(spec);
-}
+}  // namespace
 
 absl::Status CompeteWithCurves(const Workspace& workspace, SelectionResult* result) {
   return Competition(workspace, result).Run();

@@ -10,7 +10,4 @@ namespace touchstone::diagnosis::selection {
 // named effect of time that a curve alone nearly equals keeps its place; the curve counts among its competitors.
 absl::Status CompeteWithCurves(const Workspace& workspace, SelectionResult* result);
 
-// The lookup of a curve, with values that a person can read.
-absl::StatusOr<std::shared_ptr<const model::Effect>> MakeCurveEffect(const NamelessCurve& curve);
-
 }  // namespace touchstone::diagnosis::selection

@@ -85,11 +85,6 @@ absl::StatusOr<WithTerm> TryTerms(const Workspace& workspace, const engine::Step
   return best;
 }
 
-void NoteRival(const std::string& name, const engine::NamelessRival& nearest, SelectionResult* result) {
-  const auto [rival, is_new] = result->nameless_rivals.try_emplace(name, nearest);
-  if (!is_new && nearest.ahead_nats > rival->second.ahead_nats) rival->second = nearest;
-}
-
 // The same in the place of all effects that were found, and of each: what has no name may look like what has one. Notes how near
 // a term comes to each.
 absl::StatusOr<WithTerm> TryTermsInPlaceOfEffects(const Workspace& workspace,
@@ -169,6 +164,11 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
 }
 
 }  // namespace
+
+void NoteRival(const std::string& effect, const engine::NamelessRival& rival, SelectionResult* result) {
+  const auto [noted, is_new] = result->nameless_rivals.try_emplace(effect, rival);
+  if (!is_new && rival.ahead_nats > noted->second.ahead_nats) noted->second = rival;
+}
 
 absl::Status FindCompetingEffects(SelectionResult* result) {
   const engine::Explanation whole{result->fit, result->initial_effects};

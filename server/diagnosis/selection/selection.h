@@ -62,6 +62,9 @@ struct SelectionResult {
   SurfaceErrorFinding surface_error;
 };
 
+// Keeps the nearest of what has no name and competes with an effect that was found.
+void NoteRival(const std::string& effect, const engine::NamelessRival& rival, SelectionResult* result);
+
 // What competes with each step of the explanation as it stands.
 absl::Status FindCompetingEffects(SelectionResult* result);
 

@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "server/base/numbers/random.h"
-#include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/curve_effect.h"
 #include "server/diagnosis/selection/simulated_test_search.h"
 
 namespace touchstone::diagnosis::selection {

@@ -8,7 +8,7 @@
 #include "server/base/numbers/distributions.h"
 #include "server/base/status.h"
 #include "server/base/units.h"
-#include "server/diagnosis/selection/curve_competition.h"
+#include "server/diagnosis/selection/curves/curve_effect.h"
 #include "server/diagnosis/selection/curves/suggested_rest.h"
 #include "server/diagnosis/selection/ladder/ladder.h"
 #include "server/diagnosis/selection/ladder/rules.h"
