@@ -12,20 +12,29 @@ namespace touchstone::client {
 namespace {
 
 constexpr size_t kMaxOthersNamed = 3;  // that could be meant as well; more are counted
+constexpr double kMinAsserted = 0.5;   // probability beyond which a step beside what has no name is asserted
 
-std::string Steps(const v1::Report& report) {
+bool IsAsserted(const v1::Step& step) {
+  return step.probability() > kMinAsserted;
+}
+
+std::string Steps(const std::vector<v1::Step>& steps) {
   std::vector<std::string> names;
-  for (const v1::Step& step : report.steps()) {
+  for (const v1::Step& step : steps) {
     // "a (or b) and c": brackets keep the two apart.
     const std::vector<std::string> others(step.equivalent().begin(), step.equivalent().end());
     const bool counted = others.size() > kMaxOthersNamed;
-    const bool alone = report.steps_size() == 1 || others.empty();
+    const bool alone = steps.size() == 1 || others.empty();
     const std::string rest = counted ? absl::StrCat(others.size(), " others") : Join(others, "or");
     names.push_back(!alone    ? absl::StrCat(step.effect(), " (or ", rest, ")")
                     : counted ? RungName(step)
                               : StepName(step));
   }
   return Join(names, "and");
+}
+
+std::string Steps(const v1::Report& report) {
+  return Steps(std::vector<v1::Step>(report.steps().begin(), report.steps().end()));
 }
 
 std::string Falls(const ErrorScale& scale, double from, double to) {
@@ -117,15 +126,18 @@ std::string Unexplained(const v1::Report& report) {
     on = absl::StrCat(" It depends on ", CovariateName(covariate), ".");
     between_rounds = covariate == "round";
   }
+  std::vector<v1::Step> asserted, doubtful;
+  for (const v1::Step& step : report.steps()) (IsAsserted(step) ? asserted : doubtful).push_back(step);
+  const std::string instead =
+      doubtful.empty() ? "." : absl::StrCat("; ", Steps(doubtful), " may stand in for a part of it.");
   // An effect of the catalogue may explain a part of the session.
   if (between_rounds)
-    return absl::StrCat(report.steps().empty() ? "" : absl::StrCat("The model lacks ", Steps(report), ". "),
-                        "Something changed between the rounds of the session.");
-  if (report.steps().empty()) {
-    return absl::StrCat("The model is wrong in a way that no built-in effect explains.", on);
-  }
-  return absl::StrCat("The model lacks ", Steps(report),
-                      ", and something more that no built-in effect explains.", on);
+    return absl::StrCat(asserted.empty() ? "" : absl::StrCat("The model lacks ", Steps(asserted), ". "),
+                        "Something changed between the rounds of the session", instead);
+  if (asserted.empty())
+    return absl::StrCat("The model is wrong in a way that no built-in effect explains", instead, on);
+  return absl::StrCat("The model lacks ", Steps(asserted),
+                      ", and something more that no built-in effect explains", instead, on);
 }
 
 std::string CheckData(const v1::Report& report) {

@@ -23,7 +23,11 @@ struct Slope {
 // How much longer the times of `round` are than the mean of those of `others`, relative.
 std::optional<Slope> SlopeOf(const std::vector<RoundsOfPose>& poses, int round,
                              const std::vector<int>& others) {
-  double xx = 0, xd = 0, dd = 0, count = 0, pairs = 0;
+  double xx = 0, xd = 0, dd = 0, count = 0;
+  struct Pair {
+    double xx, xd;  // weighed
+  };
+  std::vector<Pair> pairs;
   for (const RoundsOfPose& pose : poses) {
     const auto own = pose.find(round);
     if (own == pose.end()) continue;
@@ -36,17 +40,22 @@ std::optional<Slope> SlopeOf(const std::vector<RoundsOfPose>& poses, int round,
     // Of a difference whose variance is (1 + 1/n) times that of one touch.
     const double weight = 1 / (1 + 1 / n);
     const Eigen::VectorXd apart = own->second - mean;
-    xx += weight * mean.squaredNorm();
-    xd += weight * mean.dot(apart);
+    pairs.push_back({weight * mean.squaredNorm(), weight * mean.dot(apart)});
+    xx += pairs.back().xx, xd += pairs.back().xd;
     dd += weight * apart.squaredNorm();
-    count += static_cast<double>(mean.size()), pairs += 1;
+    count += static_cast<double>(mean.size());
   }
-  if (pairs < kRowCheckRules.min_pairs || !(xx > 0)) return std::nullopt;
+  if (static_cast<int>(pairs.size()) < kRowCheckRules.min_pairs || !(xx > 0)) return std::nullopt;
   Slope slope;
   slope.value = xd / xx;
   slope.degrees = count - 1;
   slope.scatter_s2 = std::max(dd - slope.value * xd, 0.0) / slope.degrees;
-  slope.error = std::sqrt(slope.scatter_s2 / xx);
+  // Steep faces have long contrasts, and may scatter by more: the error also follows what each pose leaves (HC3, MacKinnon and
+  // White 1985).
+  double left = 0;
+  for (const Pair& pair : pairs)
+    left += std::pow((pair.xd - slope.value * pair.xx) / std::max(1 - pair.xx / xx, 1e-6), 2);
+  slope.error = std::sqrt(std::max(slope.scatter_s2 / xx, left / (xx * xx)));
   return slope;
 }
 

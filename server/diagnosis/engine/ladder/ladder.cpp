@@ -123,10 +123,30 @@ Verdict VerdictOf(bool rest, bool steps, bool values_wrong) {
                         : Verdict::kAdequate;
 }
 
+namespace {
+
+// A candidate alone that is no part of the explanation is at most as probable as what that leaves.
+void DoubtOthers(Improvement* improvement) {
+  if (improvement->steps.empty()) return;
+  const double explained = improvement->steps[0].probability;
+  if (explained >= 1) return;  // not assessed
+  for (RankedCandidate& candidate : improvement->candidates) {
+    const bool is_part = std::any_of(
+        improvement->steps.begin(), improvement->steps.end(), [&candidate](const LadderStep& step) {
+          return step.effect == candidate.effect ||
+                 std::count(step.equivalent.begin(), step.equivalent.end(), candidate.effect) > 0;
+        });
+    if (!is_part) candidate.probability = std::min(candidate.probability, 1 - explained);
+  }
+}
+
+}  // namespace
+
 void Conclude(const Hypotheses& found, double explained_share, Improvement* improvement) {
   improvement->verdict =
       VerdictOf(found.Leave(Leaves::kBeside), !improvement->steps.empty(), improvement->values_wrong);
   if (improvement->changed && !improvement->improved.name.empty()) improvement->improved.name += "_better";
+  DoubtOthers(improvement);
   if (!found.Leave(Leaves::kMeans)) return;
   const double doubted = kLadderRules.doubted;
   const double most = found.Leave(Leaves::kDoubts)

@@ -12,6 +12,7 @@
 #include "server/base/text/value_text.h"
 #include "server/base/units.h"
 #include "server/diagnosis/report/words/distributions_summary.h"
+#include "server/diagnosis/engine/ladder/rules.h"
 #include "server/diagnosis/report/words/rules.h"
 #include "server/diagnosis/selection/session/time_structure.h"
 #include "server/effects/all_effects.h"
@@ -128,7 +129,10 @@ void AddCauses(const Diagnosis& diagnosis, std::vector<std::string>* sentences) 
   for (const Step& step : diagnosis.steps) {
     std::string name = step.effect;
     for (const std::string& other : step.equivalent) absl::StrAppend(&name, " or ", other);
-    sentences->push_back(absl::StrCat("Missing: ", name, " (", ValuesInWords(step.parameters), ")."));
+    const bool doubtful = diagnosis.verdict == engine::Verdict::kUnexplained &&
+                          step.probability <= engine::kLadderRules.doubted;
+    sentences->push_back(absl::StrCat(doubtful ? "May stand in for a part of what is missing: " : "Missing: ",
+                                      name, " (", ValuesInWords(step.parameters), ")."));
     if (!step.equivalent.empty())
       sentences->push_back(absl::StrCat(these, " cannot tell them apart. ", step.discriminating_measurement));
     if (!step.words.empty()) sentences->push_back(step.words);
