@@ -99,7 +99,7 @@ void AddSession(const v1::Report& report, TextLayout* out) {
   out->Label("Session");
   if (smallest > kSessionP) {
     out->Paragraph(absl::StrCat(
-        "No finger's error shows a change with ", CovariateName(curves[0]->covariate()),
+        "No finger's mean residual changes with ", CovariateName(curves[0]->covariate()),
         curves.size() > 1 ? " or the touch's number" : "", " (p ", Probability(smallest), " at least)."));
     return;
   }

@@ -253,7 +253,9 @@ std::string NothingMissingWords(const v1::Report& report) {
   const double p = report.p_nothing_missing();
   // What is found only where sessions or kinds of measurement are compared, say.
   constexpr double kSaysNothing = 0.05;
-  const bool beside = report.verdict() == v1::Report::UNEXPLAINED && p > kSaysNothing;
+  const bool beside =
+      (report.verdict() == v1::Report::UNEXPLAINED || report.verdict() == v1::Report::MISSING_EFFECTS) &&
+      p > kSaysNothing;
   return absl::StrCat("P(nothing is missing) ", p < 1e-15 ? "" : "= ", Probability(p), " over ",
                       Count(report.hypotheses_tried()), " hypotheses",
                       beside ? ", of which none is what the verdict rests on." : ".");

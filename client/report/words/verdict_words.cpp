@@ -30,7 +30,10 @@ std::string TimesTheFloor(const v1::Report& report, const v1::DataReport& data) 
   const double ratio = floor.sigma > 0 ? data.initial().rmse() / floor.sigma : 0;
   if (!(ratio > 0)) return "";
   if (AgreesToRounding(data)) return "which is the rounding of files and meshes";
-  if (ratio <= 1.02) return "no more than the floor";
+  if (ratio <= 1.02)
+    return report.verdict() == v1::Report::UNEXPLAINED ? "no more than the floor: what is unexplained "
+                                                         "differs between repeats, and counts as noise here"
+                                                       : "no more than the floor";
   const std::string times = absl::StrCat(Number(ratio, 2), " times the floor");
   const std::string share = absl::StrCat(floor.bound ? "at least " : "", Share(data.reducible_share()));
   if (report.verdict() == v1::Report::CHECK_DATA) {

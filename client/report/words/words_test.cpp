@@ -140,9 +140,31 @@ TEST(Headline, SaysThatRoundsDiffer) {
   v1::Report report = UnexplainedReport();
   report.mutable_data(0)->mutable_unexplained()->mutable_covariates(0)->set_name("round");
   EXPECT_EQ(Headline(report), "Something changed between the rounds of the session.");
-  report.add_steps()->set_effect("tip_radius");
+  v1::Step* step = report.add_steps();
+  step->set_effect("tip_radius");
+  step->set_probability(0.9);
   EXPECT_EQ(Headline(report),
             "The model lacks tip_radius. Something changed between the rounds of the session.");
+}
+
+// The kind: a step of probability 0.06 stood in "The model lacks".
+TEST(Headline, AssertsBesideWhatHasNoNameOnlyWhatIsMoreProbableThanNot) {
+  v1::Report report = UnexplainedReport();
+  const auto add = [&report](const char* effect, double probability) {
+    v1::Step* step = report.add_steps();
+    step->set_effect(effect);
+    step->set_probability(probability);
+  };
+  add("oblique_slip", 0.06);
+  EXPECT_EQ(
+      Headline(report),
+      "The model is wrong in a way that no built-in effect explains; oblique_slip may stand in for a part of "
+      "it. It depends on travel.");
+  add("tip_radius", 0.86);
+  EXPECT_EQ(
+      Headline(report),
+      "The model lacks tip_radius, and something more that no built-in effect explains; oblique_slip may "
+      "stand in for a part of it. It depends on travel.");
 }
 
 TEST(Headline, NamesWhatTheDataDoWithout) {

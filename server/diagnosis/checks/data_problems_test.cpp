@@ -285,6 +285,28 @@ TEST(DataProblems, OneRoundAtAnotherSpeedIsToldBesidePhysicsThatIsMissing) {
   }
 }
 
+// The kind: a scatter that is larger at steep poses, whose contrasts are long, made a round look faster by seven standard errors.
+TEST(DataProblems, AnArmOfAnotherSpeedAtEveryTouchIsNoRoundAtAnotherSpeed) {
+  touches::HiddenRig rig = Rig();
+  rig.rounds = 4;
+  rig.sigma_us = 2000;
+  const DiagnosisInput right = MakeFile(rig);
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    const auto problems = FindRoundAtAnotherSpeed(Corrupted(right,
+                                                            [&](MeasurementSet* set) {
+                                                              RandomStream random(seed, RandomDomain::kTest);
+                                                              for (int row = 0; row < set->size(); ++row) {
+                                                                const double factor =
+                                                                    1 + 0.06 * random.Normal();
+                                                                for (int i = 0; i < 3; ++i)
+                                                                  set->time_s[row * 3 + i] *= factor;
+                                                              }
+                                                            }),
+                                                  nullptr);
+    EXPECT_TRUE(problems.empty()) << seed << ": " << problems[0].detail;
+  }
+}
+
 TEST(DataProblems, AColumnThatWasSortedAloneIsTold) {
   const auto problems = ProblemsOf(Corrupted(MakeFile(Rig()), [](MeasurementSet* set) {
     std::vector<double> column;

@@ -288,6 +288,16 @@ class DifferenceSearch {
     return there;
   }
 
+  // Of what the touches of the part scatter by more than the others, the share that the effect leaves.
+  double ExcessLeft(const Difference& d, const Eigen::VectorXd& left) const {
+    const std::vector<char>& has = has_[d.part];
+    const double share = static_cast<double>(std::count(has.begin(), has.end(), 1)) / has.size();
+    const double before = repeats_.Only(residuals_, has).squaredNorm();
+    const double after = repeats_.Only(left, has).squaredNorm();
+    const double noise = share / (1 - share) * (left.squaredNorm() - after);
+    return share < 1 && before > noise ? (after - noise) / (before - noise) : 0;
+  }
+
   // Whether the touches of the part scatter more than the others under the effect that describes it.
   bool IsMoreThan(const Difference& d, const Eigen::VectorXd& left) const {
     const std::vector<char>& has = has_[d.part];
@@ -308,7 +318,8 @@ class DifferenceSearch {
             ValueWithError(value.value, value.std_error), value.unit.empty() ? "" : " ", value.unit));
     const auto scatter = [&](double squares) { return TimeInWords(std::sqrt(squares / repeats_.degrees())); };
     std::string words = absl::StrCat("Something was other ", absl::StrJoin(places, ", or "));
-    if (values.empty() || left.squaredNorm() > kSelectionRules.max_left * residuals_.squaredNorm()) {
+    if (values.empty() || left.squaredNorm() > kSelectionRules.max_left * residuals_.squaredNorm() ||
+        ExcessLeft(d, left) > kSelectionRules.max_excess_left) {
       absl::StrAppend(&words, ", and no effect says what: touches of one pose differ by ",
                       scatter(residuals_.squaredNorm()), " where those are among them");
     } else {

@@ -228,6 +228,14 @@ struct SelectionRules {
       "An effect that leaves more of the squares describes no difference, and only the part is told.",
       "Not recorded.",
       "Smaller: weak effects are not named. Larger: effects are named that explain nothing."};
+  Rule<double> max_excess_left{
+      "selection.max_excess_left",
+      0.5,
+      "share",
+      "An effect that leaves more of what a part scatters by beyond the others does not describe the part.",
+      "Sets: rows in reversed order were a speed error of 0.50 that left seven tenths of their scatter.",
+      "Smaller: effects that explain most of a part go unnamed. Larger: effects are named that explain "
+      "little."};
   Rule<size_t> max_parts_named{"selection.max_parts_named",
                                2,
                                "",

@@ -136,12 +136,8 @@ absl::Status FindCauses(const Workspace& workspace, const std::optional<engine::
   FormulaTerm* first = nullptr;
   for (int terms = 0; terms < kSelectionRules.max_formula_terms; ++terms) {
     TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm with, TryTerms(workspace, search, best, first, best.fit));
-    if (terms == 0) {
-      // Several effects may stand in for one term, and another term explains a part of what they leave.
-      TOUCHSTONE_ASSIGN_OR_RETURN(WithTerm in_place, TryTermsInPlaceOfEffects(workspace, best, result));
-      if (in_place.found &&
-          (!with.found || in_place.explanation.fit.log_evidence > with.explanation.fit.log_evidence))
-        with = std::move(in_place);
+    if (!with.found && terms == 0) {
+      TOUCHSTONE_ASSIGN_OR_RETURN(with, TryTermsInPlaceOfEffects(workspace, best, result));
     }
     if (!with.found) break;
     // From scratch, with the formula's term as one effect among the others.

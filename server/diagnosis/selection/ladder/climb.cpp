@@ -1,5 +1,7 @@
 #include "server/diagnosis/selection/ladder/climb.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 
 #include "server/base/status.h"
@@ -8,6 +10,7 @@
 #include "server/diagnosis/selection/session/dropouts.h"
 #include "server/diagnosis/selection/session/session_order.h"
 #include "server/diagnosis/selection/session/time_structure.h"
+#include "server/effects/all_effects.h"
 
 namespace touchstone::diagnosis::selection {
 namespace {
@@ -96,13 +99,21 @@ class Climber {
                                                     ModelWith(ordered), ordered.quality, &ladder_));
   }
 
-  // Objects have sizes and places of their own; what belongs to the rig and differs between objects may differ in time.
+  // What belongs to the rig and differs between objects may differ in time; so may sizes and places, which objects have of their
+  // own, where they grow from one object to the next.
   void AddOrder(int effect, engine::LadderStep* step) const {
     const model::EffectInstance& instance = climb_.searched->model.base().effects[effect];
-    if (!instance.per_object || instance.effect->often_per_object) return;
+    if (!instance.per_object) return;
     const std::string words =
-        OrderInWords(*workspace_.observations, climb_.searched->model.OnlyObject(effect), step->parameters);
+        OrderInWords(*workspace_.observations, climb_.searched->model.OnlyObject(effect), step->parameters,
+                     instance.effect->often_per_object);
     if (!words.empty()) engine::AddWords(words, step);
+    if (instance.effect->often_per_object) return;
+    for (const std::string& other : step->equivalent)
+      if (const auto own = effects::Catalogue().Find(other); own != nullptr && own->often_per_object)
+        engine::AddWords(absl::StrCat("What belongs to the rig seldom acts on single objects: ", other,
+                                      ", which objects have of their own, explains it as well."),
+                         step);
   }
 
   const Workspace& workspace_;

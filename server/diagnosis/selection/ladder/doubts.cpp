@@ -7,6 +7,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/numbers/decompositions.h"
+#include "server/base/numbers/distributions.h"
+#include "server/diagnosis/engine/fit/resampled_covariance.h"
+#include "server/diagnosis/engine/ladder/rules.h"
 #include "server/diagnosis/selection/ladder/rules.h"
 #include "server/diagnosis/selection/session/session_order.h"
 
@@ -97,6 +101,32 @@ void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
                                     " and ", names[1], ": measure at a third one."),
                        &step);
       step.probability = std::min(step.probability, kLadderRules.max_beside_other.value());
+    }
+  }
+}
+
+void DoubtCarriedByFewPoses(const Workspace& workspace, const engine::Fit& fit,
+                            const std::vector<engine::SelectedStep>& steps, Ladder* ladder) {
+  const Eigen::MatrixXd covariance =
+      engine::ResampledCovariance(workspace.experiment, fit, workspace.input.seed);
+  for (const engine::SelectedStep& selected : steps) {
+    std::vector<int> members;
+    for (int i = 0; i < fit.model.size(); ++i)
+      if (fit.model.parameters()[i].effect == selected.effect) members.push_back(i);
+    const int size = static_cast<int>(members.size());
+    Eigen::MatrixXd own(size, size);
+    Eigen::VectorXd from_none(size);
+    for (int a = 0; a < size; ++a) {
+      from_none[a] = fit.point[members[a]] - fit.model.parameters()[members[a]].neutral;
+      for (int b = 0; b < size; ++b) own(a, b) = covariance(members[a], members[b]);
+    }
+    const double p = ChiSquaredTail(from_none.dot(SymmetricSolver(own).Solve(from_none)), size);
+    const std::string name = engine::NameOf(*fit.model.base().effects[selected.effect].effect);
+    if (size == 0 || p < kLadderRules.few_poses_p) continue;
+    for (engine::LadderStep& step : ladder->steps) {
+      if (step.effect != name) continue;
+      engine::AddWords("A few poses carry it: other poses may not show it.", &step);
+      step.probability = std::min(step.probability, engine::kLadderRules.doubted.value());
     }
   }
 }

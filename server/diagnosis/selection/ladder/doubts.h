@@ -22,4 +22,9 @@ void DoubtUnusualValues(const engine::Fit& fit, const std::vector<engine::Select
 void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
                     const std::vector<engine::SelectedStep>& steps, Ladder* ladder);
 
+// Beside a rest that may be an error of each pose: doubts effects whose values would differ from none by chance if the poses were
+// drawn again, since a few poses with large errors carry them. `fit`: on the touches of the search.
+void DoubtCarriedByFewPoses(const Workspace& workspace, const engine::Fit& fit,
+                            const std::vector<engine::SelectedStep>& steps, Ladder* ladder);
+
 }  // namespace touchstone::diagnosis::selection

@@ -68,6 +68,8 @@ class LadderBuilder {
                                   DescribeUnexplained(workspace_, selection_, ladder_, climb_.with_formula));
       found_.DescribeRest(&*ladder_.unexplained);
     }
+    if (found_.Leave(engine::Leaves::kMeans))
+      DoubtCarriedByFewPoses(workspace_, selection_.fit, selection_.steps, &ladder_);
     engine::Conclude(found_, ExplainedShare(), &ladder_);
     TOUCHSTONE_RETURN_IF_ERROR(AddPosterior());
     return std::move(ladder_);

@@ -62,6 +62,14 @@ struct LadderRules {
                            "Not recorded.",
                            "Smaller: true values of a bad set-up are doubted more. Larger: mistakes of the "
                            "set-up pass as certain."};
+  Rule<double> few_poses_p{"selection.ladder.few_poses_p",
+                           1e-4,
+                           "probability",
+                           "Beside a rest without a name, an effect is doubted if its values "
+                           "differ from none by chance so often.",
+                           "Argument: tenfold below what one effect in a hundred would show by chance.",
+                           "Smaller: effects are doubted that other poses show too. Larger: a few poses with "
+                           "large errors make an effect."};
   Rule<double> max_beside_other{
       "selection.ladder.max_beside_other",
       0.5,

@@ -70,9 +70,9 @@ double GrowthPerHour(const touches::Observations& o, const std::map<int, Stretch
 }  // namespace
 
 std::string OrderInWords(const touches::Observations& o, const std::string& only,
-                         const std::vector<engine::ParameterEstimate>& values) {
+                         const std::vector<engine::ParameterEstimate>& values, bool own_by_nature) {
   const std::map<int, Stretch> stretches = StretchesOfObjects(o);
-  if (stretches.size() < 2) return "";
+  if (stretches.size() < 2 || (own_by_nature && !only.empty())) return "";
   for (const auto& [object, stretch] : stretches) {
     if (!only.empty() && o.objects[object] != only) continue;
     if (OthersBetween(o, stretch, object) > 0) return "";
@@ -85,9 +85,11 @@ std::string OrderInWords(const touches::Observations& o, const std::string& only
   const double growth = o.set->has_session_time ? GrowthPerHour(o, stretches, values) : 0;
   if (growth != 0)
     return absl::StrFormat(
-        "The values grow steadily in the order in which the objects were touched, by %.3g %s an hour: growth "
-        "with time (a tip that wears) would look alike. Touch the objects in turns to tell.",
-        growth, values[0].unit);
+        "The values grow steadily in the order in which the objects were touched, by %.3g%s an hour: growth "
+        "with time (a tip that wears, a part that warms) would look alike. Touch the objects in turns to "
+        "tell.",
+        growth, values[0].unit.empty() ? "" : " " + values[0].unit);
+  if (own_by_nature) return "";
   return "The objects were touched one after another: a change with time would look alike. Touch them in "
          "turns "
          "to tell.";

@@ -10,11 +10,12 @@
 
 namespace touchstone::diagnosis::selection {
 
-// Of an effect of the rig that acts on one object only, or on each in its own measure, where the touches of an object are one
-// stretch of the session: a change in time would look alike. `only`: the object; empty: each has its own of `values`, which
-// may grow steadily in the order of touching. Empty: the order of the touches tells the two apart.
+// Of an effect that acts on one object only, or on each in its own measure, where the touches of an object are one stretch of the
+// session: a change in time would look alike. `only`: the object; empty: each has its own of `values`, which may grow steadily in
+// the order of touching. `own_by_nature`: objects have such values of their own, and only growth is odd. Empty: the order of the
+// touches tells the two apart.
 std::string OrderInWords(const touches::Observations& observations, const std::string& only,
-                         const std::vector<engine::ParameterEstimate>& values);
+                         const std::vector<engine::ParameterEstimate>& values, bool own_by_nature);
 
 // Pairs of steps (indices into `steps`) that differ by nothing but how they depend on the speed, where the searched touches
 // have two speeds: any dependence on the speed is some sum of the two.

@@ -32,20 +32,30 @@ std::vector<engine::ParameterEstimate> ValuesOf(const touches::Observations& o,
 }
 
 TEST(OrderInWords, NamesTheStretchInWhichTheOnlyObjectWasTouched) {
-  EXPECT_THAT(OrderInWords(OneAfterAnother(), "object4", {}), HasSubstr("from touch 80 to touch 99"));
+  EXPECT_THAT(OrderInWords(OneAfterAnother(), "object4", {}, false), HasSubstr("from touch 80 to touch 99"));
 }
 
 TEST(OrderInWords, TellsSteadyGrowthInTheOrderOfTouching) {
   const touches::Observations o = OneAfterAnother();
-  EXPECT_THAT(OrderInWords(o, "", ValuesOf(o, {1.0, 1.1, 1.2, 1.3, 1.4})), HasSubstr("by 1.8 mm an hour"));
-  const std::string unsteady = OrderInWords(o, "", ValuesOf(o, {1.0, 1.4, 1.0, 1.3, 1.4}));
+  EXPECT_THAT(OrderInWords(o, "", ValuesOf(o, {1.0, 1.1, 1.2, 1.3, 1.4}), false),
+              HasSubstr("by 1.8 mm an hour"));
+  const std::string unsteady = OrderInWords(o, "", ValuesOf(o, {1.0, 1.4, 1.0, 1.3, 1.4}), false);
   EXPECT_THAT(unsteady, HasSubstr("one after another"));
+}
+
+// The kind: object_scale that rose from object to object in the order of touching was said without a word about time.
+TEST(OrderInWords, OfWhatObjectsHaveOfTheirOwnSaysSteadyGrowthAlone) {
+  const touches::Observations o = OneAfterAnother();
+  EXPECT_THAT(OrderInWords(o, "", ValuesOf(o, {1.0, 1.1, 1.2, 1.3, 1.4}), true),
+              HasSubstr("by 1.8 mm an hour"));
+  EXPECT_EQ(OrderInWords(o, "", ValuesOf(o, {1.0, 1.4, 1.0, 1.3, 1.4}), true), "");
+  EXPECT_EQ(OrderInWords(o, "object4", {}, true), "");
 }
 
 TEST(OrderInWords, SaysNothingWhereObjectsAreTouchedInTurns) {
   const touches::Observations o = touches::SyntheticSet(5, 20, 2, 0.005, 1).observations;
-  EXPECT_EQ(OrderInWords(o, "object4", {}), "");
-  EXPECT_EQ(OrderInWords(o, "", ValuesOf(o, {1, 1.1, 1.2, 1.3, 1.4})), "");
+  EXPECT_EQ(OrderInWords(o, "object4", {}, false), "");
+  EXPECT_EQ(OrderInWords(o, "", ValuesOf(o, {1, 1.1, 1.2, 1.3, 1.4}), false), "");
 }
 
 // A cause that grows with the square root of the speed: two effects fit it at two speeds.
