@@ -41,8 +41,9 @@ void AddPixelNoise(const PixelNoise& found, int channels, const engine::Quality&
   });
   if (own == effects.end()) {
     if (sigma < kImageRules.min_sigma_grey && gain == 0) return;
-    engine::LadderStep& step = engine::AddNoiseStep(effect, {sigma, gain}, std::move(parameters),
-                                                    engine::kCompetitionRules.max_probability, quality, improvement);
+    engine::LadderStep& step =
+        engine::AddNoiseStep(effect, {sigma, gain}, std::move(parameters),
+                             engine::kCompetitionRules.max_probability, quality, improvement);
     step.model = improvement->improved;
     return;
   }
