@@ -25,7 +25,8 @@ def read_rules(root):
     rules = []
     for path in sorted((root / "server/diagnosis").rglob("*rules.h")):
         for kind, name, number, unit in row.findall(path.read_text()):
-            rules.append(Rule(name, float(number), unit, "double" if kind == "double" else "int"))
+            over = [float(part.replace("'", "")) for part in number.split("/")]  # 4.0 / 3, 250'000
+            rules.append(Rule(name, over[0] / (over[1] if over[1:] else 1), unit, "double" if kind == "double" else "int"))
     return rules
 
 

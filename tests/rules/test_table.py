@@ -3,7 +3,7 @@ import pathlib
 
 import table
 
-OUTPUT = """ok   one 7 (1.2 s): hidden tip_radius 0.3 => MISSING_EFFECT tip_radius 0.31 P 1.00
+OUTPUT = """ok    one 7 (1.2 s): hidden tip_radius 0.3 => MISSING_EFFECT tip_radius 0.31 P 1.00
         truth named: yes
 WRONG two 8 (0.9 s): hidden oblique_slip 0.1 => ADEQUATE
 """
