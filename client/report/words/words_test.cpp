@@ -120,6 +120,10 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
   report.set_verdict(v1::Report::UNEXPLAINED);
   EXPECT_EQ(NothingMissingWords(report),
             "P(nothing is missing) = 0.31 over 214 hypotheses, of which none is what the verdict rests on.");
+  report.set_verdict(
+      v1::Report::MISSING_EFFECTS);  // noise with a name, say, of which no hypothesis of the means is part
+  EXPECT_EQ(NothingMissingWords(report),
+            "P(nothing is missing) = 0.31 over 214 hypotheses, of which none is what the verdict rests on.");
   EXPECT_EQ(NothingMissingWords(CheckDataReport()),
             "P(nothing is missing) is not assessed: a mistake in the data comes first.");
   EXPECT_EQ(NothingMissingWords(TooLittleDataReport()),
@@ -133,6 +137,17 @@ TEST(NothingMissing, IsANumberOrTheReasonWhyThereIsNone) {
       "pictures are too few.");
   report.mutable_data()->DeleteSubrange(0, report.data_size() - 1);
   EXPECT_EQ(NothingMissingWords(report), "P(nothing is missing) is not assessed: the pictures are too few.");
+}
+
+// The kind: "no more than the floor" read as an all-clear where repeats hold what is unexplained.
+TEST(TimesTheFloor, SaysWhereRepeatsHoldWhatIsUnexplained) {
+  v1::Report report = UnexplainedReport();
+  v1::DataReport* data = report.mutable_data(0);
+  data->set_noise_floor(5000);
+  data->mutable_initial()->set_rmse(5000);
+  EXPECT_THAT(TimesTheFloor(report, *data), HasSubstr("differs between repeats, and counts as noise here"));
+  report.set_verdict(v1::Report::ADEQUATE);
+  EXPECT_EQ(TimesTheFloor(report, *data), "no more than the floor");
 }
 
 // An effect of the catalogue that acts in one round: not "in a way that no built-in effect explains".

@@ -32,7 +32,7 @@ struct CheckRules {
       "share",
       "Of the touches of each object, or of the pictures, those that fit best count in the error of a trial.",
       "Argument: missing physics spoils a few; these neither hide a mistake nor make one.",
-      "Smaller: a mistake in most of them is missed. Larger: a few spoilt ones decide."};
+      "Smaller: a mistake in most of them is missed. Larger: a few corrupted ones decide."};
   Rule<double> min_speed_m_s{"checks.min_speed_m_s",
                              1e-6,
                              "m/s",

@@ -86,7 +86,7 @@ struct JointRules {
       "Blocks of a session share errors where their scatter is less probable by chance, over all that is "
       "tried.",
       "Not recorded.",
-      "Larger: errors of values grow by chance. Smaller: sessions that wander are told to differ."};
+      "Larger: errors of values grow by chance. Smaller: sessions that drift are said to differ."};
   Rule<double> moved_share{
       "joint.moved_share",
       1e-3,

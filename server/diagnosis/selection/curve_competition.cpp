@@ -63,7 +63,7 @@ class Competition {
 
   absl::StatusOr<bool> IsMemoryWithoutCurve() {
     if (best_) return false;
-    TOUCHSTONE_RETURN_IF_ERROR(LookForMemory(workspace_, named_, &result_).status());
+    TOUCHSTONE_RETURN_IF_ERROR(LookForMemory(workspace_, named_, &result_));
     return true;
   }
 

@@ -66,16 +66,15 @@ absl::StatusOr<bool> TakeNoiseWithMemory(const Workspace& workspace, const engin
   return true;
 }
 
-absl::StatusOr<bool> LookForMemory(const Workspace& workspace, const engine::Fit& named,
-                                   SelectionResult* result) {
-  if (result->formula >= 0) return false;
+absl::Status LookForMemory(const Workspace& workspace, const engine::Fit& named, SelectionResult* result) {
+  if (result->formula >= 0) return absl::OkStatus();
   TOUCHSTONE_ASSIGN_OR_RETURN(const bool declared, IsDeclaredMemory(workspace, named));
   TOUCHSTONE_ASSIGN_OR_RETURN(const touches::Prediction prediction,
                               workspace.searched_predictor->Run(named.model.base(), false, false));
   const touches::Observations& o = *workspace.searched;
   if (!declared && !(FindTimeStructure(o, touches::Residuals(o, prediction)).p < kSessionRules.time_p))
-    return false;
-  return TakeNoiseWithMemory(workspace, named, NamelessCurve().gain_nats, result);
+    return absl::OkStatus();
+  return TakeNoiseWithMemory(workspace, named, NamelessCurve().gain_nats, result).status();
 }
 
 }  // namespace touchstone::diagnosis::selection

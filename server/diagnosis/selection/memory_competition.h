@@ -20,7 +20,6 @@ absl::StatusOr<bool> TakeNoiseWithMemory(const Workspace& workspace, const engin
                                          double curve_nats, SelectionResult* result);
 
 // The same where no curve was found: asked if repeats share a course in time, or the given model says that they do.
-absl::StatusOr<bool> LookForMemory(const Workspace& workspace, const engine::Fit& named,
-                                   SelectionResult* result);
+absl::Status LookForMemory(const Workspace& workspace, const engine::Fit& named, SelectionResult* result);
 
 }  // namespace touchstone::diagnosis::selection

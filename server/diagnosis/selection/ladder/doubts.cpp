@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "server/base/numbers/decompositions.h"
 #include "server/base/numbers/distributions.h"
@@ -43,6 +44,15 @@ std::string UnusualValue(const model::Effect& effect, const engine::LadderStep& 
   return absl::StrFormat(
       "Would need %.3g %s, more than rigs show (up to %.3g %s): look for a mistake in the set-up.",
       farthest->value, farthest->unit, limit, farthest->unit);
+}
+
+// Says `words` of the steps of this effect, which are at most as probable as `most`.
+void Doubt(const std::string& effect, const std::string& words, double most, Ladder* ladder) {
+  for (engine::LadderStep& step : ladder->steps) {
+    if (step.effect != effect) continue;
+    engine::AddWords(words, &step);
+    step.probability = std::min(step.probability, most);
+  }
 }
 
 }  // namespace
@@ -95,13 +105,11 @@ void DoubtTwoSpeeds(const Workspace& workspace, const engine::Fit& fit,
   };
   for (const auto& [one, other] : PairsAtTwoSpeeds(*workspace.searched, touches, fit, steps)) {
     const std::string names[] = {name_of(one), name_of(other)};
-    for (engine::LadderStep& step : ladder->steps) {
-      if (step.effect != names[0] && step.effect != names[1]) continue;
-      engine::AddWords(absl::StrCat("At two speeds, whatever depends on the speed is some sum of ", names[0],
-                                    " and ", names[1], ": measure at a third one."),
-                       &step);
-      step.probability = std::min(step.probability, kLadderRules.max_beside_other.value());
-    }
+    for (const std::string& name : std::set<std::string>{names[0], names[1]})
+      Doubt(name,
+            absl::StrCat("At two speeds, whatever depends on the speed is some sum of ", names[0], " and ",
+                         names[1], ": measure at a third one."),
+            kLadderRules.max_beside_other, ladder);
   }
 }
 
@@ -114,6 +122,7 @@ void DoubtCarriedByFewPoses(const Workspace& workspace, const engine::Fit& fit,
     for (int i = 0; i < fit.model.size(); ++i)
       if (fit.model.parameters()[i].effect == selected.effect) members.push_back(i);
     const int size = static_cast<int>(members.size());
+    if (size == 0) continue;
     Eigen::MatrixXd own(size, size);
     Eigen::VectorXd from_none(size);
     for (int a = 0; a < size; ++a) {
@@ -121,13 +130,9 @@ void DoubtCarriedByFewPoses(const Workspace& workspace, const engine::Fit& fit,
       for (int b = 0; b < size; ++b) own(a, b) = covariance(members[a], members[b]);
     }
     const double p = ChiSquaredTail(from_none.dot(SymmetricSolver(own).Solve(from_none)), size);
-    const std::string name = engine::NameOf(*fit.model.base().effects[selected.effect].effect);
-    if (size == 0 || p < kLadderRules.few_poses_p) continue;
-    for (engine::LadderStep& step : ladder->steps) {
-      if (step.effect != name) continue;
-      engine::AddWords("A few poses carry it: other poses may not show it.", &step);
-      step.probability = std::min(step.probability, engine::kLadderRules.doubted.value());
-    }
+    if (p < kLadderRules.few_poses_p) continue;
+    Doubt(engine::NameOf(*fit.model.base().effects[selected.effect].effect),
+          "A few poses carry it: other poses may not show it.", engine::kLadderRules.doubted, ladder);
   }
 }
 
