@@ -12,7 +12,8 @@ struct FitRules {
       "",
       "Steps of Gauss and Newton that one fit takes at most.",
       "Cost: each step simulates the derivatives, or updates them, and predicts at least once.",
-      "Smaller: fits far from their start end before the best values. Larger: fits that oscillate take longer."};
+      "Smaller: fits far from their start end before the best values. Larger: fits that oscillate take "
+      "longer."};
   Rule<double> converged{
       "engine.fit.converged",
       0.02,
